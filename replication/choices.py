@@ -1,0 +1,122 @@
+"""The register of choices: what the paper leaves open, what we chose, and what else is accepted.
+
+The register itself is the data file ``choices.toml``. This module reads it and gives parameter
+dataclasses their fields: a field declared with :func:`choice` takes its default from the register
+and accepts exactly the values that are registered for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+Value = str | int | float
+
+
+class ChoiceError(ValueError):
+    """A parameter has a name or a value that the register does not know."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One entry of the register; ``choices.toml`` explains the fields."""
+
+    id: str
+    place: str
+    open: str
+    default: Value
+    rule: str
+    alternatives: tuple[Value, ...] = ()
+    range: tuple[float, float] | None = None
+    field: str = ""
+    data: str = ""
+    code: str = ""
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the paper states the value, so that only another task would change it."""
+        return self.open.startswith("stated:")
+
+    @property
+    def accepted(self) -> str:
+        """The accepted values in words, for error messages and tables."""
+        if self.range is not None:
+            low, high = self.range
+            return f"a number from {low:g} to {high:g}"
+        return ", ".join(repr(value) for value in (self.default, *self.alternatives))
+
+    def check(self, value: Any) -> Value:
+        """Return `value` in the type of the default.
+
+        Raises
+        ------
+        ChoiceError
+            If the register does not accept the value.
+        """
+        kind = type(self.default)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if kind is str:
+            fits = isinstance(value, str)
+        else:
+            fits = number and math.isfinite(value) and (kind is float or value == int(value))
+        if fits:
+            value = kind(value)
+            if self.range is not None:
+                fits = self.range[0] <= value <= self.range[1]
+            else:
+                fits = value in (self.default, *self.alternatives)
+        if not fits:
+            raise ChoiceError(
+                f"{self.field} = {value!r} is not accepted (choice {self.id}): use {self.accepted}"
+            )
+        return value
+
+
+@cache
+def register() -> dict[str, Choice]:
+    """Return the register: each :class:`Choice` by its id, in the order of the file.
+
+    Raises
+    ------
+    ChoiceError
+        If the file has an entry with an unknown key or an id twice.
+    """
+    text = resources.files("replication").joinpath("choices.toml").read_text(encoding="utf-8")
+    entries: dict[str, Choice] = {}
+    for entry in tomllib.loads(text)["choice"]:
+        lists = {key: tuple(entry[key]) for key in ("alternatives", "range") if key in entry}
+        try:
+            one = Choice(**{**entry, **lists})
+        except TypeError as error:
+            raise ChoiceError(f"choices.toml, entry {entry.get('id')!r}: {error}") from None
+        if one.id in entries:
+            raise ChoiceError(f"choices.toml has the id {one.id!r} twice")
+        entries[one.id] = one
+    return entries
+
+
+def choice(id: str) -> Any:
+    """Declare a dataclass field that holds the registered choice `id`, with its default."""
+    return dataclasses.field(default=register()[id].default, metadata={"choice": id})
+
+
+class Chosen:
+    """Base of the parameter dataclasses: each field is a registered choice and is checked."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            entry = register()[field.metadata["choice"]]
+            object.__setattr__(self, field.name, entry.check(getattr(self, field.name)))
+
+
+def unknown_name(name: str, known: list[str], what: str) -> ChoiceError:
+    """Return the error for a misspelt `name`, with the nearest of the `known` ones first."""
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    return ChoiceError(f"unknown {what} {name!r}{hint}; known: {', '.join(known)}")

@@ -1,0 +1,16 @@
+"""Environments: tabular worlds that feed both Gymnasium and the compiled learner.
+
+Importing this package registers ``replication/Maze-v0`` with Gymnasium.
+"""
+
+import gymnasium
+
+from replication.envs.maze import ACTIONS, Maze, MazeEnv, MazeError
+
+__all__ = ["ACTIONS", "Maze", "MazeEnv", "MazeError"]
+
+gymnasium.register(
+    id="replication/Maze-v0",
+    entry_point="replication.envs.maze:MazeEnv",
+    max_episode_steps=500,
+)

@@ -1,0 +1,353 @@
+"""Mazes drawn as text: one table of moves, and a Gymnasium environment on top of it.
+
+A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
+edge of the map is a wall that is not drawn. A move into an obstacle or off the map stays in place.
+The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the compiled learner
+both read it, so they cannot disagree.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ACTIONS", "Maze", "MazeEnv", "MazeError"]
+
+ACTIONS = ("up", "down", "right", "left")
+"""The names of the actions 0..3, in the paper's order."""
+
+MAX_SIDE = 1_000
+MAX_CELLS = 100_000
+
+_MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1))  # (row, column) of each action
+_SMALL_MAP = ("....G", ".##..", ".....", "..##.", "S....")
+_PIXELS = 8  # side of a cell in an RGB image
+_COLOURS = {".": (255, 255, 255), "#": (64, 64, 64), "S": (158, 202, 225), "G": (161, 217, 155)}
+_AGENT_COLOUR = (214, 39, 40)
+
+
+_Array = TypeVar("_Array", bound=NDArray[Any])
+
+
+class MazeError(ValueError):
+    """A map that is not a maze; the message is one line that names the place and the mend."""
+
+
+@dataclass(frozen=True)
+class Maze:
+    """A maze, validated when it is made.
+
+    Parameters
+    ----------
+    rows
+        The lines of the map, the top one first.
+
+    Raises
+    ------
+    MazeError
+        If the map is empty, too large or not rectangular, holds an unknown character, does not
+        have exactly one start and one goal, or its goal cannot be reached.
+
+    Notes
+    -----
+    States number the cells line by line: ``state = row * n_columns + column``, with row 0 at the
+    top and column 0 at the left. Obstacle cells have numbers too, but cannot be entered.
+
+    Examples
+    --------
+    >>> maze = Maze.from_text('''
+    ...     ..G
+    ...     S#.
+    ... ''')
+    >>> maze.shape, maze.start, maze.goal
+    ((2, 3), 3, 2)
+    >>> maze.next_state[maze.start].tolist()  # up, down, right, left
+    [0, 3, 3, 3]
+    >>> maze.distances().tolist()
+    [2, 1, 0, 3, -1, 1]
+    """
+
+    rows: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", _checked_rows(self.rows))
+        if self.distances()[self.start] < 0:
+            raise MazeError(
+                f"the goal at {_place(*self.cell(self.goal))} cannot be reached from the start at "
+                f"{_place(*self.cell(self.start))}; open a way through the obstacles"
+            )
+
+    def __reduce__(self) -> tuple[type[Maze], tuple[tuple[str, ...]]]:
+        """Copy and pickle the map alone, so that a copy's tables are read-only as well."""
+        return Maze, (self.rows,)
+
+    @classmethod
+    def from_text(cls, text: str) -> Maze:
+        """Read a maze from text, one line a row; blank margins around the map are ignored."""
+        return cls(tuple(line.strip() for line in text.strip().splitlines()))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+        return len(self.rows), len(self.rows[0])
+
+    @property
+    def n_states(self) -> int:
+        """Number of states: all cells, obstacles included."""
+        return len(self.rows) * len(self.rows[0])
+
+    @property
+    def n_actions(self) -> int:
+        """Number of actions: 4."""
+        return len(ACTIONS)
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """Names of the actions."""
+        return ACTIONS
+
+    @cached_property
+    def start(self) -> int:
+        """State of the start."""
+        return "".join(self.rows).index("S")
+
+    @cached_property
+    def goal(self) -> int:
+        """State of the goal."""
+        return "".join(self.rows).index("G")
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Whether a state can be entered, bool [state], read-only."""
+        return _read_only(np.array([character != "#" for character in "".join(self.rows)]))
+
+    @cached_property
+    def next_state(self) -> NDArray[np.int64]:
+        """The state that an action leads to, int64 [state, action], read-only.
+
+        Obstacle cells lead to themselves. The goal is a cell like any other: that an episode ends
+        there is left to the environment and the learner.
+        """
+        n_rows, n_columns = self.shape
+        states = np.arange(self.n_states)
+        row, column = np.divmod(states, n_columns)
+        table = np.empty((self.n_states, self.n_actions), dtype=np.int64)
+        for action, (down, right) in enumerate(_MOVES):
+            target = np.clip(row + down, 0, n_rows - 1) * n_columns
+            target += np.clip(column + right, 0, n_columns - 1)
+            table[:, action] = np.where(self.free & self.free[target], target, states)
+        return _read_only(table)
+
+    def cell(self, state: int) -> tuple[int, int]:
+        """Row and column of a state."""
+        if not 0 <= state < self.n_states:
+            raise MazeError(f"there is no state {state}; states are 0..{self.n_states - 1}")
+        row, column = divmod(int(state), self.shape[1])
+        return row, column
+
+    def state(self, row: int, column: int) -> int:
+        """State of a row and column."""
+        n_rows, n_columns = self.shape
+        if not (0 <= row < n_rows and 0 <= column < n_columns):
+            raise MazeError(
+                f"there is no cell [{row},{column}]; rows are 0..{n_rows - 1}, "
+                f"columns 0..{n_columns - 1}"
+            )
+        return int(row) * n_columns + int(column)
+
+    def distances(self, to: int | None = None) -> NDArray[np.int64]:
+        """Least number of moves from each state to the state `to` (default: the goal).
+
+        Returns
+        -------
+        int64 [state], read-only
+            -1 where there is no way.
+        """
+        if to is None or to == self.goal:
+            return self._goal_distances
+        self.cell(to)
+        return self._breadth_first(to)
+
+    def replay(self, actions: Iterable[int]) -> NDArray[np.int64]:
+        """States that actions visit from the start on: int64 [T + 1] for T actions."""
+        states = [self.start]
+        for action in actions:
+            states.append(self.next_state.item(states[-1], action))
+        return np.array(states, dtype=np.int64)
+
+    @cached_property
+    def _goal_distances(self) -> NDArray[np.int64]:
+        return self._breadth_first(self.goal)
+
+    def _breadth_first(self, origin: int) -> NDArray[np.int64]:
+        neighbours = self.next_state.tolist()  # a move can be taken back: predecessors as well
+        distance = [-1] * self.n_states
+        distance[origin] = 0
+        queue = deque([origin])
+        while queue:
+            state = queue.popleft()
+            for neighbour in neighbours[state]:
+                if distance[neighbour] < 0:
+                    distance[neighbour] = distance[state] + 1
+                    queue.append(neighbour)
+        return _read_only(np.array(distance, dtype=np.int64))
+
+
+class MazeEnv(gymnasium.Env[Any, Any]):
+    """A maze as a Gymnasium environment, registered as ``replication/Maze-v0``.
+
+    Observations are states, actions the numbers of `ACTIONS`. An episode starts at the start and
+    terminates at the goal; truncation is left to Gymnasium's ``TimeLimit`` (500 steps when made
+    through the registry).
+
+    Parameters
+    ----------
+    maze
+        A `Maze` or the rows of one; a small built-in maze by default.
+    weights
+        Reward R(s, a) of taking action a in state s, float [state, action]; 0 by default.
+    render_mode
+        "ansi": the map as text with the agent as ``@``; "rgb_array": uint8 [height, width, 3].
+
+    Raises
+    ------
+    MazeError
+        If the map is not a maze.
+    ValueError
+        If the weights have another shape or are not finite, or the render mode is unknown.
+
+    Examples
+    --------
+    >>> env = gymnasium.make("replication/Maze-v0", maze=["S.G"])
+    >>> env.reset(seed=1)
+    (0, {})
+    >>> env.step(ACTIONS.index("right"))
+    (1, 0.0, False, False, {})
+    >>> env.step(ACTIONS.index("right"))
+    (2, 0.0, True, False, {})
+    """
+
+    # Gymnasium declares this as an instance variable, so it cannot be a ClassVar here.
+    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 10}  # noqa: RUF012
+
+    def __init__(
+        self,
+        maze: Maze | Sequence[str] = _SMALL_MAP,
+        weights: ArrayLike | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self.maze = maze if isinstance(maze, Maze) else Maze(tuple(maze))
+        self.weights = _checked_weights(self.maze, weights)
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"unknown render mode {render_mode!r}; known: ansi, rgb_array")
+        self.render_mode = render_mode
+        self.observation_space = gymnasium.spaces.Discrete(self.maze.n_states)
+        self.action_space = gymnasium.spaces.Discrete(self.maze.n_actions)
+        self._state: int | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
+        """Go to the start; the environment draws nothing from its seed."""
+        super().reset(seed=seed)
+        self._state = self.maze.start
+        return self._state, {}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Take one action; returns (state, reward, terminated, truncated, info)."""
+        if self._state is None:
+            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
+        if not self.action_space.contains(action):
+            raise gymnasium.error.InvalidAction(f"there is no action {action!r}; actions are 0..3")
+        reward = self.weights.item(self._state, action)
+        self._state = self.maze.next_state.item(self._state, action)
+        return self._state, reward, self._state == self.maze.goal, False, {}
+
+    def render(self) -> Any:
+        """Draw the maze and the agent; None without a render mode."""
+        if self.render_mode == "ansi":
+            return self._text()
+        if self.render_mode == "rgb_array":
+            return self._image()
+        return None
+
+    def _text(self) -> str:
+        rows = [list(row) for row in self.maze.rows]
+        if self._state is not None:
+            row, column = self.maze.cell(self._state)
+            rows[row][column] = "@"
+        return "\n".join("".join(row) for row in rows) + "\n"
+
+    def _image(self) -> NDArray[np.uint8]:
+        cells = [[_COLOURS[character] for character in row] for row in self.maze.rows]
+        image = np.array(cells, dtype=np.uint8).repeat(_PIXELS, axis=0).repeat(_PIXELS, axis=1)
+        if self._state is not None:
+            top, left = (_PIXELS * index + 2 for index in self.maze.cell(self._state))
+            image[top : top + _PIXELS - 4, left : left + _PIXELS - 4] = _AGENT_COLOUR
+        return image
+
+
+def _checked_rows(rows: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(rows, str) or not all(isinstance(row, str) for row in rows):
+        raise MazeError("rows must be a sequence of lines; use Maze.from_text for a single text")
+    rows = tuple(rows)
+    if not rows or not rows[0]:
+        raise MazeError("the map is empty; draw at least a start 'S' and a goal 'G'")
+    if max(len(rows), *map(len, rows)) > MAX_SIDE or len(rows) * len(rows[0]) > MAX_CELLS:
+        raise MazeError(
+            f"the map has {len(rows)} lines of up to {max(map(len, rows))} characters; "
+            f"keep it within {MAX_SIDE} a side and {MAX_CELLS} cells"
+        )
+    for index, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise MazeError(
+                f"map line {index + 1} has {len(row)} characters, but line 1 has {len(rows[0])}; "
+                "make all lines equally long"
+            )
+        for column, character in enumerate(row):
+            if character not in _COLOURS:
+                raise MazeError(
+                    f"unknown character {character!r} at {_place(index, column)}; "
+                    "use '.' free, '#' obstacle, 'S' start, 'G' goal"
+                )
+    for character, name in (("S", "start"), ("G", "goal")):
+        places = [
+            _place(index, column)
+            for index, row in enumerate(rows)
+            for column, drawn in enumerate(row)
+            if drawn == character
+        ]
+        if not places:
+            raise MazeError(f"the map has no {name}; mark one cell with {character!r}")
+        if len(places) > 1:
+            raise MazeError(
+                f"the map has {len(places)} {name}s {character!r}, at {places[0]} and at "
+                f"{places[1]}; keep one"
+            )
+    return rows
+
+
+def _checked_weights(maze: Maze, weights: ArrayLike | None) -> NDArray[np.float64]:
+    shape = (maze.n_states, maze.n_actions)
+    array = np.zeros(shape) if weights is None else np.array(weights, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"weights have shape {array.shape}; this maze needs {shape}")
+    if not np.isfinite(array).all():
+        raise ValueError("weights must be finite; replace NaN and infinity")
+    return _read_only(array)
+
+
+def _place(row: int, column: int) -> str:
+    return f"map line {row + 1}, column {column + 1}"  # counted from 1, as editors do
+
+
+def _read_only(array: _Array) -> _Array:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,175 @@
+"""The scripted expert: the rules that made the stored demonstrations of the mazes.
+
+The paper shows its demonstrations only as pictures, so ours follow from rules, the same for every
+maze. The expert always drives whole trajectories from the start:
+
+``correct``
+    Among the shortest paths the one whose straight legs are nearest to a given length (choice
+    DEMO-SHAPE).
+``hit``
+    Misses a turn: at a corner of the correct path it drives straight on until it bumps.
+``detour``, ``near-detour``, ``far-detour``
+    Takes a turn too wide: leaves the correct path in the middle of the leg before a corner, passes
+    a point outside the corner, and joins the path again in the middle of the leg after it. How far
+    outside is the choice DETOUR-WIDTH; a near one keeps 1 cell off, a far one as far as walls allow.
+``opposite``
+    Turns round just before the goal and drives the correct path back to the start.
+
+There is one demonstration of a kind at each corner where the rule can be carried out (choice
+INCORRECT-NUMBER).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from replication.demos import Demo, Demos
+from replication.envs.maze import Maze
+from replication.params import Expert
+
+OPPOSITE = (1, 0, 3, 2)  # of up, down, right, left
+
+
+def demonstrate(task: str, maze: Maze, *, params: Expert, description: str = "") -> Demos:
+    """Return the demonstrations of all kinds for a maze."""
+    actions = correct_actions(maze, leg=params.leg)
+    return Demos(
+        task=task,
+        environment=maze,
+        correct=(_drive(maze, actions, "correct", "correct"),),
+        incorrect=tuple(incorrect_demos(maze, actions, params=params)),
+        description=description,
+    )
+
+
+def correct_actions(maze: Maze, *, leg: int) -> list[int]:
+    """Return the actions of the shortest path whose legs are nearest to `leg` moves.
+
+    Nearest means the smallest sum of squared differences over the legs; among equals the action
+    that comes first in the paper's order is taken first.
+    """
+    distances = maze.distances()
+
+    @cache
+    def best(state: int, last: int, run: int) -> tuple[float, int]:
+        """Cost of the legs that are not finished yet, and the action to take."""
+        if state == maze.goal:
+            return float((run - leg) ** 2), -1
+        options = []
+        for action in range(maze.n_actions):
+            there = int(maze.next_state[state, action])
+            if distances[there] == distances[state] - 1:
+                turned = last not in (-1, action)
+                ahead, _ = best(there, action, 1 if turned or last == -1 else run + 1)
+                options.append((ahead + ((run - leg) ** 2 if turned else 0), action))
+        return min(options)
+
+    actions: list[int] = []
+    state, last, run = maze.start, -1, 0
+    while state != maze.goal:
+        action = best(state, last, run)[1]
+        run = run + 1 if action == last else 1
+        state, last = int(maze.next_state[state, action]), action
+        actions.append(action)
+    return actions
+
+
+def incorrect_demos(maze: Maze, correct: list[int], *, params: Expert) -> Iterator[Demo]:
+    """Yield the incorrect demonstrations of every kind that belong to a correct one.
+
+    INCORRECT-NUMBER: one of a kind for each corner where it can be driven.
+    """
+    corners = [t for t in range(1, len(correct)) if correct[t] != correct[t - 1]]
+    widths = {
+        "detour": params.detour_width,
+        "near-detour": 1,
+        "far-detour": max(maze.shape),
+    }
+    found = {"hit": [_miss(maze, correct, corner) for corner in corners]}
+    for kind, width in widths.items():
+        found[kind] = [_detour(maze, correct, corner, width) for corner in corners]
+    back = [OPPOSITE[action] for action in reversed(correct[:-1])]
+    found["opposite"] = [correct[:-1] + back]
+    for kind, drives in found.items():
+        for number, actions in enumerate(filter(None, drives), start=1):
+            yield _drive(maze, actions, f"{kind}-{number}", kind)
+
+
+def _drive(maze: Maze, actions: list[int], name: str, kind: str) -> Demo:
+    states = _states(maze, actions)
+    return Demo(name=name, kind=kind, states=states, actions=np.array(actions))
+
+
+def _states(maze: Maze, actions: list[int]) -> np.ndarray:
+    states = [maze.start]
+    for action in actions:
+        states.append(int(maze.next_state[states[-1], action]))
+    return np.array(states)
+
+
+def _miss(maze: Maze, correct: list[int], corner: int) -> list[int] | None:
+    """Drive straight on at the corner until a move changes nothing; None if the goal is there."""
+    actions = correct[:corner]
+    state = int(_states(maze, actions)[-1])
+    while True:
+        actions = [*actions, correct[corner - 1]]
+        there = int(maze.next_state[state, actions[-1]])
+        if there == maze.goal:
+            return None
+        if there == state:
+            return actions
+        state = there
+
+
+def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int] | None:
+    """Round the corner `width` cells outside, or as wide as it goes; None if not at all."""
+    turns = [0, *(t for t in range(1, len(correct)) if correct[t] != correct[t - 1]), len(correct)]
+    at = turns.index(corner)
+    leave = (turns[at - 1] + corner) // 2
+    join = (corner + turns[at + 1] + 1) // 2
+    path = _states(maze, correct)
+    row, column = maze.cell(int(path[corner]))
+    ahead, back = correct[corner - 1], OPPOSITE[correct[corner]]
+    for reach in range(width, 0, -1):
+        point = (row, column)
+        for action in (ahead, back):
+            for _ in range(reach):
+                point = _beside(point, action)
+        if not all(0 <= x < size for x, size in zip(point, maze.shape, strict=True)):
+            continue
+        ways = [int(path[leave]), maze.state(*point), int(path[join])]
+        legs = [
+            _fewest_turns(maze, a, b, avoid=set(path.tolist()) - {a, b}) for a, b in pairwise(ways)
+        ]
+        if all(legs):
+            return correct[:leave] + [a for part in legs for a in part or []] + correct[join:]
+    return None
+
+
+def _beside(point: tuple[int, int], action: int) -> tuple[int, int]:
+    down, right = ((-1, 0), (1, 0), (0, 1), (0, -1))[action]
+    return point[0] + down, point[1] + right
+
+
+def _fewest_turns(maze: Maze, source: int, target: int, *, avoid: set[int]) -> list[int] | None:
+    """Return the shortest way with the fewest turns that keeps off `avoid`, or None."""
+    best: dict[tuple[int, int], tuple[int, int, list[int]]] = {}
+    queue: deque[tuple[int, int, list[int]]] = deque([(source, -1, [])])
+    while queue:
+        state, last, actions = queue.popleft()
+        turns = sum(a != b for a, b in pairwise(actions))
+        known = best.get((state, last))
+        if known is not None and (known[0], known[1]) <= (len(actions), turns):
+            continue
+        best[state, last] = (len(actions), turns, actions)
+        for action in range(maze.n_actions):
+            there = int(maze.next_state[state, action])
+            if there != state and there not in avoid and state != target:
+                queue.append((there, action, [*actions, action]))
+    reached = [found for (state, _), found in best.items() if state == target]
+    return min(reached)[2] if reached else None
