@@ -1,17 +1,21 @@
 """Demonstration files: one JSON file holds a task, its environment and its demonstrations.
 
-A file looks like this (``data/demos/schema.json`` has the full structure)::
+A file looks like this (``data/demos/schema.json`` has the full structure):
+
+.. code-block:: json
 
     {
-        "format": "replication-demos",
-        "version": 1,
-        "task": "corridor",
-        "description": "free text",
-        "environment": {"kind": "maze", "map": ["S.G", "..."]},
-        "correct": [
-            {"name": "straight", "actions": ["right", "right"], "states": [[0, 0], [0, 1], [0, 2]]}
-        ],
-        "incorrect": [{"name": "bump", "kind": "hit", "actions": ["up", "right", "right"]}],
+      "format": "replication-demos",
+      "version": 1,
+      "task": "corridor",
+      "description": "free text",
+      "environment": {"kind": "maze", "map": ["S.G", "..."]},
+      "correct": [
+        {"name": "straight", "actions": ["right", "right"], "states": [[0,0], [0,1], [0,2]]}
+      ],
+      "incorrect": [
+        {"name": "bump", "kind": "hit", "actions": ["up", "right", "right"]}
+      ]
     }
 
 What follows from the rest may be left out: ``states``, the ``actions``, ``start`` and ``goal`` of
@@ -29,8 +33,8 @@ import math
 import os
 import re
 import stat
-import tempfile
 import warnings
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -42,6 +46,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from replication.envs.maze import MAX_SIDE, Maze, MazeError
+from replication.files import write_file
 
 __all__ = [
     "Demo",
@@ -50,18 +55,27 @@ __all__ = [
     "Demos",
     "check_demos",
     "content_hash",
+    "demos_document",
     "json_schema",
     "load_demos",
+    "parse_demos",
     "save_demos",
 ]
 
 FORMAT = "replication-demos"
 VERSION = 1
 MAX_BYTES = 10_000_000
+MAX_FIELDS = 50
 RESERVED_KINDS = ("correct", "all", "none")
 
 _KIND = r"^[a-z][a-z0-9-]*$"
+_NAME = r"^[^\u0000-\u001f\u007f]+$"
 _TASK = r"^[A-Za-z0-9][A-Za-z0-9_-]*$"
+_MENDS = {
+    _KIND: "use small letters, digits and '-', a letter first",
+    _NAME: "write it on one line, without control characters",
+    _TASK: "use letters, digits, '-' and '_', a letter or digit first",
+}
 
 
 class DemoError(ValueError):
@@ -144,7 +158,7 @@ class Demos:
         object.__setattr__(self, "correct", tuple(self.correct))
         object.__setattr__(self, "incorrect", tuple(self.incorrect))
         if not re.fullmatch(_TASK, self.task):
-            _fail(f"task {_show(self.task)} is not a name of letters, digits, '-' and '_'")
+            _fail(f"task {_show(self.task)} does not fit: {_MENDS[_TASK]}")
         if not self.correct:
             _fail("there is no correct demo; give at least one from the start to the goal")
         names: set[str] = set()
@@ -166,8 +180,8 @@ class Demos:
         for demo in self.incorrect:
             if not re.fullmatch(_KIND, demo.kind) or demo.kind in RESERVED_KINDS:
                 _fail(
-                    f"demo {_show(demo.name)} is incorrect, of kind {_show(demo.kind)}; use small "
-                    f"letters, digits and '-', and none of {', '.join(RESERVED_KINDS)}"
+                    f"demo {_show(demo.name)} is incorrect, of kind {_show(demo.kind)}; "
+                    f"{_MENDS[_KIND]}, but none of {', '.join(RESERVED_KINDS)}"
                 )
 
     @property
@@ -193,7 +207,7 @@ class Demos:
         wanted = () if kinds == "none" else tuple(kinds.split("+"))
         for kind in wanted:
             if kind not in self.kinds:
-                known = ", ".join(("all", "none", *self.kinds))
+                known = _clip(", ".join(("all", "none", *self.kinds)), 300)
                 _fail(f"task {self.task} has no incorrect demo of kind {_show(kind)}; use {known}")
         return replace(self, incorrect=tuple(d for d in self.incorrect if d.kind in wanted))
 
@@ -240,15 +254,12 @@ def save_demos(demos: Demos, path: str | os.PathLike[str]) -> None:
     DemoError
         If the file could not be read back (its text is too long, for instance) or not be written.
     """
-    text = _layout(_document(demos))
-    if _in_file(path, lambda: _parse(text.encode(errors="replace"))) != demos:
-        _fail(f"{_file(path)}: the demos do not survive being written and read back")
-    target = Path(path)
+    text = _layout(demos_document(demos))
     try:
-        with tempfile.TemporaryDirectory(prefix=".demos-", dir=target.parent) as folder:
-            draft = Path(folder) / "draft.json"
-            draft.write_bytes(text.encode())
-            draft.replace(target)
+        _in_file(path, lambda: parse_demos(text.encode()))
+        write_file(path, text)
+    except DemoError:
+        raise
     except (OSError, ValueError) as error:
         _fail(f"{_file(path)}: cannot be written ({_reason(error)})")
 
@@ -279,12 +290,16 @@ def json_schema() -> dict[str, Any]:
 
 # --- what a file holds -----------------------------------------------------------------------
 
+# A kind of environment is a class of fields here, told apart by `kind`, that can `build` the
+# environment and `describe` it, and an environment with `actions`, `goal`, `replay` and `cells`.
+# A second kind turns the field `environment` of DemoFile into a union, discriminated by `kind`.
+
 
 class _Fields(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-_Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\u0000-\u001f\u007f]+$")]
+_Name = Annotated[str, Field(min_length=1, max_length=100, pattern=_NAME)]
 _Cell = Annotated[list[Annotated[int, Field(ge=0, lt=MAX_SIDE)]], Field(min_length=2, max_length=2)]
 _Actions = Annotated[list[Annotated[str, Field(max_length=100)]], Field(fail_fast=True)]
 _States = Annotated[list[_Cell], Field(fail_fast=True)]
@@ -354,7 +369,11 @@ class DemoFile(_Fields):
     task: Annotated[str, Field(max_length=100, pattern=_TASK)]
     description: Annotated[str, Field(max_length=10_000)] = ""
     environment: MazeFields
-    correct: Annotated[list[CorrectFields], Field(fail_fast=True, min_length=1, max_length=10_000)]
+    # That there is at least one is checked by `Demos`, which says it better.
+    correct: Annotated[
+        list[CorrectFields],
+        Field(fail_fast=True, max_length=10_000, json_schema_extra={"minItems": 1}),
+    ]
     incorrect: Annotated[list[IncorrectFields], Field(fail_fast=True, max_length=10_000)] = []
 
 
@@ -369,7 +388,7 @@ _MODELS: dict[str, type[BaseModel]] = {
 
 
 def _read(path: str | os.PathLike[str]) -> Demos:
-    return _in_file(path, lambda: _parse(_content(path)))
+    return _in_file(path, lambda: parse_demos(_content(path)))
 
 
 def _in_file(path: str | os.PathLike[str], read: Callable[[], Demos]) -> Demos:
@@ -381,20 +400,32 @@ def _in_file(path: str | os.PathLike[str], read: Callable[[], Demos]) -> Demos:
 
 def _content(path: str | os.PathLike[str]) -> bytes:
     try:
-        if not stat.S_ISREG(Path(path).stat().st_mode):
+        info = Path(path).stat()
+        if not stat.S_ISREG(info.st_mode):
             _fail("is not a regular file; give the path of a JSON file")
+        _check_size(info.st_size)
         with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            return file.read(MAX_BYTES + 1)
     except DemoError:
         raise
     except (OSError, ValueError) as error:
         _fail(f"cannot be read ({_reason(error)})")
-    if len(content) > MAX_BYTES:
-        _fail(f"is larger than {MAX_BYTES // 1_000_000} MB; split it or drop demos")
-    return content
 
 
-def _parse(content: bytes) -> Demos:
+def _check_size(n_bytes: int) -> None:
+    if n_bytes > MAX_BYTES:
+        _fail(f"is larger than {MAX_BYTES // 1_000_000} MB; drop some demos")
+
+
+def parse_demos(content: bytes) -> Demos:
+    """Read and check the content of a demonstration file.
+
+    Raises
+    ------
+    DemoError
+        On the first thing that is wrong, in one line that names the place and the mend.
+    """
+    _check_size(len(content))
     data = _json(content)
     if not isinstance(data, dict):
         _fail(f"holds {_show(data)}; a demonstration file is one JSON object")
@@ -449,9 +480,10 @@ def _json(content: bytes) -> Any:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for index, key in enumerate(keys) if key in set(keys[:index]))
+        twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
         _fail(f"the field {_show(twice)} stands twice in one object; keep one")
+    if len(fields) > MAX_FIELDS:
+        _fail(f"an object has {len(fields)} fields; no object of this format has so many")
     return fields
 
 
@@ -506,7 +538,7 @@ def _check_demo(environment: Maze, demo: Demo) -> None:
     if actions.min() < 0 or actions.max() >= environment.n_actions:
         _fail(f"demo {name}: actions must be 0..{environment.n_actions - 1}")
     states = environment.replay(actions)
-    _check_claims(environment, demo.name, actions, states, _cells(environment, demo.states))
+    _check_claims(environment, demo.name, actions, states, environment.cells(demo.states))
     early = np.flatnonzero(states[:-1] == environment.goal)
     if early.size:
         _fail(
@@ -523,7 +555,7 @@ def _check_claims(
     claims: NDArray[np.int64],
 ) -> None:
     """Compare claimed cells [n, 2] with those of the replayed states [T + 1]."""
-    cells = _cells(environment, states)
+    cells = environment.cells(states)
     both = min(len(cells), len(claims))
     wrong = np.flatnonzero((cells[:both] != claims[:both]).any(axis=1))
     if wrong.size:
@@ -569,7 +601,7 @@ def _doubts(demos: Demos) -> list[str]:
 
 def _explain(error: ValidationError, data: dict[str, Any]) -> str:
     """One line for the first thing that pydantic found."""
-    first = error.errors(include_url=False, include_context=False)[0]
+    first = error.errors(include_url=False)[0]
     place, kind = first["loc"], first["type"]
     where = _where(place[:-1] if kind in ("extra_forbidden", "missing") else place, data)
     if kind == "extra_forbidden":
@@ -582,7 +614,8 @@ def _explain(error: ValidationError, data: dict[str, Any]) -> str:
         )
     if kind == "missing":
         return f"{where}the field {place[-1]!r} is missing; add it"
-    return f"{where}{_show(first['input'])} does not fit: {_lower(first['msg'])}"
+    mend = _MENDS.get(first.get("ctx", {}).get("pattern", ""), _lower(first["msg"]))
+    return f"{where}{_show(first['input'])} does not fit: {mend}"
 
 
 def _where(place: tuple[int | str, ...], data: Any) -> str:
@@ -602,13 +635,13 @@ def _where(place: tuple[int | str, ...], data: Any) -> str:
 # --- writing ---------------------------------------------------------------------------------
 
 
-def _document(demos: Demos) -> dict[str, Any]:
-    """Return the whole file as plain JSON values."""
+def demos_document(demos: Demos) -> dict[str, Any]:
+    """Return what a demonstration file holds, as plain JSON values."""
 
     def trajectory(demo: Demo) -> dict[str, Any]:
         return {
             "actions": [demos.environment.actions[action] for action in demo.actions],
-            "states": _cells(demos.environment, demo.states).tolist(),
+            "states": demos.environment.cells(demo.states).tolist(),
         }
 
     return {
@@ -652,11 +685,6 @@ def _integers(values: ArrayLike, name: str, field: str) -> NDArray[np.int64]:
     return array
 
 
-def _cells(environment: Maze, states: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Rows and columns of states, int64 [n, 2]."""
-    return np.stack(np.divmod(states, environment.shape[1]), axis=1)
-
-
 def _cell(environment: Maze, state: int) -> str:
     return _compact(list(environment.cell(state)))
 
@@ -691,7 +719,7 @@ def _lower(text: str) -> str:
 
 
 def _file(path: str | os.PathLike[str]) -> str:
-    text = os.fspath(path)
+    text = os.fsdecode(path)
     return text if text.isprintable() else repr(text)
 
 

@@ -17,10 +17,14 @@ class Trajectory(Protocol):
     """Anything with `states` [T + 1] and `actions` [T], the last state being where it ended."""
 
     @property
-    def states(self) -> NDArray[np.int64]: ...
+    def states(self) -> NDArray[np.int64]:
+        """Visited states."""
+        ...
 
     @property
-    def actions(self) -> NDArray[np.int64]: ...
+    def actions(self) -> NDArray[np.int64]:
+        """Actions taken there."""
+        ...
 
 
 def feature_expectations(

@@ -11,7 +11,8 @@ maze. The expert always drives whole trajectories from the start:
 ``detour``, ``near-detour``, ``far-detour``
     Takes a turn too wide: leaves the correct path in the middle of the leg before a corner, passes
     a point outside the corner, and joins the path again in the middle of the leg after it. How far
-    outside is the choice DETOUR-WIDTH; a near one keeps 1 cell off, a far one as far as walls allow.
+    outside is the choice DETOUR-WIDTH; a near one keeps 1 cell off, a far one as far as the walls
+    allow. Where the point cannot be passed without turning back, the detour is narrower.
 ``opposite``
     Turns round just before the goal and drives the correct path back to the start.
 
@@ -35,8 +36,11 @@ from replication.params import Expert
 OPPOSITE = (1, 0, 3, 2)  # of up, down, right, left
 
 
-def demonstrate(task: str, maze: Maze, *, params: Expert, description: str = "") -> Demos:
+def demonstrate(
+    task: str, maze: Maze, *, params: Expert | None = None, description: str = ""
+) -> Demos:
     """Return the demonstrations of all kinds for a maze."""
+    params = params or Expert()
     actions = correct_actions(maze, leg=params.leg)
     return Demos(
         task=task,
@@ -146,8 +150,9 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
         legs = [
             _fewest_turns(maze, a, b, avoid=set(path.tolist()) - {a, b}) for a, b in pairwise(ways)
         ]
-        if all(legs):
-            return correct[:leave] + [a for part in legs for a in part or []] + correct[join:]
+        way = [action for part in legs for action in part or []]
+        if all(legs) and all(b != OPPOSITE[a] for a, b in pairwise(way)):
+            return correct[:leave] + way + correct[join:]
     return None
 
 

@@ -68,6 +68,7 @@ class Report(Chosen):
     """What the tables and figures show of the trials."""
 
     trials: int = choice("TABLE2-TRIALS")
+    set_trials: int = choice("SET-TRIALS")
     surface: str = choice("FIG7-SURFACE")
     mid_term: float = choice("FIG7-MIDTERM")
 

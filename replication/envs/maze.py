@@ -152,6 +152,10 @@ class Maze:
         row, column = divmod(int(state), self.shape[1])
         return row, column
 
+    def cells(self, states: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Rows and columns of many states [n], as int64 [n, 2]; the states are not checked."""
+        return np.stack(np.divmod(states, self.shape[1]), axis=1)
+
     def state(self, row: int, column: int) -> int:
         """State of a row and column."""
         n_rows, n_columns = self.shape

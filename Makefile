@@ -1,0 +1,75 @@
+# `make` alone lists the targets.
+PYTHON ?= python3
+
+VENV := .venv
+RUN := $(VENV)/bin/python
+PIP := $(RUN) -m pip --disable-pip-version-check --no-input --quiet
+
+# Nothing but the locked environment may be imported.
+unexport PYTHONPATH PYTHONHOME
+# Nor may a local store of packages decide which versions and files the lock names.
+unexport UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
+
+.PHONY: help reproduce quick test bench lint lock clean
+.DELETE_ON_ERROR:
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s%s\n", $$1, $$2 }' Makefile
+	@echo 'The first target builds $(VENV) from environment.lock; PYTHON=python3.12 names its interpreter.'
+
+reproduce: $(VENV)/.ready ## run everything in the paper and judge each claim
+	$(VENV)/bin/replicate run --profile paper
+
+quick: $(VENV)/.ready ## the same with few trials, into build/quick
+	$(VENV)/bin/replicate run --profile quick --out build/quick
+
+test: $(VENV)/.ready ## run the tests
+	$(RUN) -m pytest
+
+bench: $(VENV)/.ready ## measure speed
+	$(RUN) -m pytest benchmarks -s
+
+lint: $(VENV)/.ready ## check style, types and the lock
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+	$(RUN) tools/check_lock.py
+
+# One version of a package for all Pythons (--fork-strategy fewest): the same numbers everywhere.
+lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check them on every Python
+	$(RUN) -m uv pip compile --no-config --quiet --universal --fork-strategy fewest --python-version 3.11 \
+	    --generate-hashes --only-binary :all: --upgrade --no-annotate \
+	    --custom-compile-command 'make lock' --extra dev --output-file environment.lock pyproject.toml
+	$(RUN) tools/check_lock.py
+	@set -e; for version in 3.11 3.12 3.13; do \
+	    echo "resolving environment.lock for Python $$version"; \
+	    $(RUN) -m uv pip install --no-config --quiet --dry-run --python-version $$version --target build/lock \
+	        --require-hashes --only-binary :all: --requirement environment.lock; \
+	done
+
+clean: ## remove build products and caches (not .venv)
+	rm -rf build *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -path './$(VENV)' -prune -o \
+	    \( -name __pycache__ -o -name .ipynb_checkpoints \) -type d -prune -exec rm -rf {} +
+
+# The stamps are written last, so a set-up that broke off starts again from nothing; so does one
+# that was copied or moved here, since it would import the other folder's source.
+ifneq "$(shell cat $(VENV)/.ready 2>/dev/null)" "$(CURDIR)"
+.PHONY: $(VENV)/.locked
+endif
+
+$(VENV)/.locked: environment.lock
+	@"$(PYTHON)" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null || { \
+	    echo 'error: $(PYTHON) is not Python 3.11, 3.12 or 3.13; name one: make PYTHON=python3.12' >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { \
+	    echo 'error: $(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv' >&2; exit 1; }
+	@echo 'building $(VENV) from environment.lock (a minute or two)'
+	@rm -rf $(VENV)
+	@"$(PYTHON)" -m venv $(VENV)
+	@$(PIP) install --require-hashes --only-binary :all: --requirement environment.lock
+	@touch $@
+
+$(VENV)/.ready: $(VENV)/.locked pyproject.toml
+	@echo 'installing the package itself'
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@pwd -P > $@

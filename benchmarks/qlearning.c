@@ -1,0 +1,83 @@
+/* The yardstick of the benchmark: Q-learning (Eq. 1) as one would write it in C for speed.
+ *
+ * One trial after the other, with the semantics and the bits of replication/reference.py. The
+ * number of actions is a compile-time constant (-DACTIONS=4), tables are contiguous, the random
+ * stream stays in registers, and ties are broken without a branch.
+ */
+
+#include <stdint.h>
+
+#ifndef ACTIONS
+#define ACTIONS 4
+#endif
+
+typedef struct {
+    int64_t states, start, goal, episodes, horizon;
+    double beta, gamma;
+    uint64_t threshold; /* explore if the high half of the draw is below this */
+    int64_t random_ties, bootstrap_goal;
+} task;
+
+static inline uint64_t rotate(uint64_t word, int bits) {
+    return word << bits | word >> (64 - bits);
+}
+
+static inline uint64_t draw(uint64_t s[4]) {
+    const uint64_t word = rotate(s[0] + s[3], 23) + s[0], t = s[1] << 17;
+    s[2] ^= s[0];
+    s[3] ^= s[1];
+    s[1] ^= s[2];
+    s[0] ^= s[3];
+    s[2] ^= t;
+    s[3] = rotate(s[3], 45);
+    return word;
+}
+
+static inline double best_of(const double *row) {
+    double best = row[0];
+    for (int a = 1; a < ACTIONS; a++) best = row[a] > best ? row[a] : best;
+    return best;
+}
+
+static inline int64_t choose(const double *row, uint64_t word, uint64_t threshold, int64_t random) {
+    const uint64_t low = word & 0xffffffff;
+    if (word >> 32 < threshold) return (int64_t)(low * ACTIONS >> 32);
+    const double best = best_of(row);
+    uint64_t ties[ACTIONS], count = 0; /* ties[a]: the maximisers among the actions 0..a */
+    for (int a = 0; a < ACTIONS; a++) ties[a] = count += row[a] == best;
+    const uint64_t pick = random ? low * count >> 32 : 0;
+    int64_t action = 0;
+    for (int a = 0; a < ACTIONS - 1; a++) action += ties[a] <= pick;
+    return action;
+}
+
+/* next_state [states, ACTIONS]; weights, q [trials, states, ACTIONS]; streams [trials, 4] */
+void learn(const task *k, int64_t trials, const int64_t *restrict next_state,
+           const double *restrict weights, double *restrict q, uint64_t *restrict streams,
+           int64_t *restrict steps) {
+    for (int64_t trial = 0; trial < trials; trial++) {
+        const double *w = weights + trial * k->states * ACTIONS;
+        double *table = q + trial * k->states * ACTIONS;
+        uint64_t s[4] = {streams[4 * trial], streams[4 * trial + 1], streams[4 * trial + 2],
+                         streams[4 * trial + 3]};
+        int64_t taken = 0;
+        for (int64_t episode = 0; episode < k->episodes; episode++) {
+            int64_t state = k->start;
+            for (int64_t t = 0; t < k->horizon; t++) {
+                double *row = table + state * ACTIONS;
+                const int64_t action = choose(row, draw(s), k->threshold, k->random_ties);
+                const int64_t next = next_state[state * ACTIONS + action];
+                const int goal = next == k->goal;
+                const double value =
+                    goal && !k->bootstrap_goal ? 0.0 : best_of(table + next * ACTIONS);
+                const double target = w[state * ACTIONS + action] + k->gamma * value;
+                row[action] += k->beta * (target - row[action]);
+                taken++;
+                state = next;
+                if (goal) break;
+            }
+        }
+        for (int i = 0; i < 4; i++) streams[4 * trial + i] = s[i];
+        steps[trial] = taken;
+    }
+}

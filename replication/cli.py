@@ -1,0 +1,331 @@
+"""The command `replicate`.
+
+A mistake of the user is one line on stderr and exit code 2; a run that fails has exit code 1, an
+interrupted one 130. Modules that take long to import are imported by the commands that need them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import sys
+import textwrap
+import warnings
+from enum import StrEnum
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from replication import paths
+
+
+class Profile(StrEnum):
+    """How much is run."""
+
+    QUICK = "quick"
+    PAPER = "paper"
+
+
+class OneLineErrors(TyperGroup):
+    """Says a user's mistake in one line; a fault of the program keeps its traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            _fail("interrupted", 130)
+        except ValueError as error:
+            if not type(error).__module__.startswith("replication."):
+                raise
+            _fail(str(error))
+        except OSError as error:
+            if error.filename is None:
+                raise
+            _fail(f"{error.filename}: {(error.strerror or str(error)).lower()}")
+
+
+class TwoWords(TyperCommand):
+    """Lets `-p NAME VALUE` take two words; typer's lists hold single ones."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Join the two words of each `-p`, then parse as usual."""
+        joined: list[str] = []
+        rest = list(args)
+        while rest and rest[0] != "--":
+            word = rest.pop(0)
+            if word == "-p":
+                if len(rest) < 2 or not rest[0].isidentifier():
+                    _fail("-p takes two words, a parameter's name and its value: -p trials 10")
+                word = f"-p{rest.pop(0)}={rest.pop(0)}"
+            joined.append(word)
+        return super().parse_args(ctx, joined + rest)
+
+
+app = typer.Typer(
+    cls=OneLineErrors,
+    help="Inverse reinforcement learning from correct and incorrect demonstrations, replicated.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+demos_app = typer.Typer(help="Check demonstration files.", no_args_is_help=True)
+app.add_typer(demos_app, name="demos")
+
+Pairs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-p",
+        metavar="NAME VALUE",
+        help="Set a parameter; VALUE is JSON, or else text. May be repeated.",
+    ),
+]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"replicate {metadata.version('unified-irl-replication')}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Take the options that come before a command."""
+
+
+@app.command(cls=TwoWords)
+def run(
+    notebooks: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NOTEBOOK]...", help="Names or paths; all by default."),
+    ] = None,
+    profile: Annotated[Profile, typer.Option(help="How much is run.")] = Profile.PAPER,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Worker processes; one a usable core by default.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Root seed.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the outputs; figures, or build/PROFILE, by default."),
+    ] = None,
+    timeout: Annotated[int, typer.Option(min=1, help="Seconds that one cell may take.")] = 3600,
+    parameters: Pairs = None,
+) -> None:
+    """Run notebooks and publish their figures, tables and data."""
+    from replication.regenerate import RunError, run_notebooks
+
+    files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
+    default = paths.PROJECT / ("figures" if profile == "paper" else f"build/{profile}")
+    target = out or default
+    try:
+        published = run_notebooks(
+            list(dict.fromkeys(files)),
+            profile=profile.value,
+            out=target,
+            jobs=jobs,
+            seed=seed,
+            parameters=_values(parameters),
+            timeout=timeout,
+            echo=typer.echo,
+        )
+    except RunError as error:
+        if error.details:
+            plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
+            typer.echo(error.details if sys.stderr.isatty() else plain, err=True)
+        _fail(str(error), 1)
+    for table in (path for path in published if path.suffix == ".md"):
+        typer.echo(f"\n{table.read_text(encoding='utf-8').strip()}")
+    executed = paths.PROJECT / "build" / "executed" / profile
+    typer.echo(f"\n{len(published)} outputs are in {_short(target)}")
+    typer.echo(f"executed notebooks are in {_short(executed)}")
+
+
+@app.command(cls=TwoWords)
+def learn(
+    file: Annotated[Path, typer.Argument(help="A demonstration file.")],
+    method: Annotated[str, typer.Option(help="Name of the method.")] = "unified-incorrect",
+    seed: Annotated[int, typer.Option(min=0, help="Root seed.")] = 0,
+    incorrect: Annotated[
+        str, typer.Option(metavar="SET", help="Incorrect demos: all, none, or kinds joined by +.")
+    ] = "all",
+    parameters: Pairs = None,
+    out: Annotated[Path, typer.Option(help="Folder for the result.")] = Path("build/learn"),
+) -> None:
+    """Learn a reward from the demonstrations of a file.
+
+    Writes TASK-METHOD.json and a picture of it. A result that has not converged is a result: it
+    is reported as such, with exit code 0.
+    """
+    from replication import figures
+    from replication.demos import load_demos
+    from replication.fit import fit
+    from replication.irl import get_method
+    from replication.params import Params
+
+    get_method(method)
+    params = Params.of(**{"incorrect": "all", **_values(parameters)})
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        demos = load_demos(file).select(incorrect)
+    result = fit(demos, method=method, params=params, seed=seed)
+    stem = out / f"{demos.task}-{method}"
+    saved = result.save(f"{stem}.json")
+    figures.save_figure(figures.fit_figure(result), stem, formats=("png",))
+    ended = "converged" if result.converged else "NOT converged"
+    typer.echo(
+        f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
+        f"d = {result.errors[-1]:.4g}"
+    )
+    typer.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
+
+
+@demos_app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files to check.")],
+) -> None:
+    """Check demonstration files; exit code 1 if any cannot be used."""
+    from replication.demos import DemoError, check_demos
+
+    failed = False
+    for file in files:
+        try:
+            found = check_demos(file)
+        except DemoError as error:
+            typer.echo(f"error: {error}", err=True)
+            failed = True
+            continue
+        for warning in found:
+            typer.echo(f"{file}: warning: {warning}")
+        if not found:
+            typer.echo(f"{file}: ok")
+    raise typer.Exit(int(failed))
+
+
+@demos_app.command()
+def schema() -> None:
+    """Print the JSON Schema of demonstration files."""
+    from replication.demos import json_schema
+
+    typer.echo(json.dumps(json_schema(), indent=2))
+
+
+@app.command()
+def choices(
+    id: Annotated[str | None, typer.Argument(metavar="[ID]", help="Show one whole.")] = None,
+) -> None:
+    """List the choices that the paper leaves open, and ours."""
+    from replication.choices import register, unknown_name
+
+    entries = register()
+    width = shutil.get_terminal_size().columns
+    if id is None:
+        rows = [("ID", "DEFAULT", "ALTERNATIVES", "FIELD, DATA OR CODE")]
+        rows += [
+            (one.id, str(one.default), _accepted(one), one.field or one.data or one.code)
+            for one in entries.values()
+        ]
+        _print_table(rows, (16, 30, 34), width)
+        return
+    if id.upper() not in entries:
+        raise unknown_name(id, list(entries), "choice")
+    one = entries[id.upper()]
+    lines = {
+        "id": one.id,
+        "place": one.place,
+        "open": one.open,
+        "default": str(one.default),
+        "rule": one.rule,
+        "alternatives": _accepted(one),
+        "field": one.field,
+        "data": one.data,
+        "code": one.code,
+    }
+    for key, value in lines.items():
+        if value:
+            head = f"{key + ':':<14}"
+            typer.echo(textwrap.fill(head + value, width, subsequent_indent=" " * 14))
+
+
+def _accepted(one: Any) -> str:
+    if one.range is not None:
+        return f"{one.range[0]:g} to {one.range[1]:g}"
+    return ", ".join(map(str, one.alternatives))
+
+
+def _print_table(rows: list[tuple[str, ...]], widths: tuple[int, ...], width: int) -> None:
+    """Print rows in columns; a cell that is too long goes on in the next line."""
+    last = max(20, width - sum(widths) - 2 * len(widths))
+    for row in rows:
+        cells = [
+            textwrap.wrap(cell, size) or [""]
+            for cell, size in zip(row, (*widths, last), strict=True)
+        ]
+        for line in range(max(map(len, cells))):
+            parts = [cell[line] if line < len(cell) else "" for cell in cells]
+            padded = [f"{part:<{size}}" for part, size in zip(parts, (*widths, 0), strict=True)]
+            typer.echo("  ".join(padded).rstrip())
+
+
+def _notebook(name: str) -> Path:
+    """Find a notebook by its name or path."""
+    path = Path(name)
+    if path.suffix == ".ipynb" or len(path.parts) > 1:
+        return paths.resolve(path)
+    known = [one.stem for one in _all_notebooks()]
+    if name not in known:
+        from replication.choices import unknown_name
+
+        raise unknown_name(name, known, "notebook")
+    return paths.PROJECT / "notebooks" / f"{name}.ipynb"
+
+
+def _all_notebooks() -> list[Path]:
+    found = sorted((paths.PROJECT / "notebooks").glob("*.ipynb"))
+    if not found:
+        _fail(f"there is no notebook in {paths.PROJECT / 'notebooks'}")
+    return found
+
+
+def _values(pairs: list[str] | None) -> dict[str, Any]:
+    """Return the values of joined `NAME=VALUE` words."""
+    values: dict[str, Any] = {}
+    for pair in pairs or []:
+        name, _, text = pair.partition("=")
+        if name in values:
+            _fail(f"-p {name} is given twice")
+        try:
+            values[name] = json.loads(text, parse_constant=_no_constant)
+        except ValueError:
+            values[name] = text
+    return values
+
+
+def _no_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not JSON")
+
+
+def _show_warning(message: Warning | str, *_: Any) -> None:
+    typer.echo(f"warning: {message}", err=True)
+
+
+def _short(path: Path) -> str:
+    """Show a path relative to the working folder where it lies below it."""
+    absolute = path.resolve()
+    below = absolute.is_relative_to(Path.cwd())
+    return os.path.relpath(absolute) if below else str(absolute)
+
+
+def _fail(message: str, code: int = 2) -> NoReturn:
+    typer.echo(f"error: {message}", err=True)
+    raise typer.Exit(code)

@@ -1,0 +1,389 @@
+"""All drawing. Each function takes numbers that are already computed and returns a figure.
+
+Figures do not go through pyplot and its global state. Files carry no time or version, and SVG ids
+are derived from the content, so that equal numbers give equal bytes on one platform.
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from replication.demos import Demo, Demos
+from replication.envs.maze import Maze
+from replication.files import write_file
+from replication.fit import Fit
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.2,
+    "svg.hashsalt": "replication",
+    "svg.fonttype": "path",
+    "savefig.dpi": 200,
+}
+
+# Okabe and Ito's colours, which most colour-blind readers can tell apart.
+COLOURS = {"adaboost": "#7A7A7A", "unified": "#0072B2", "unified-incorrect": "#D55E00"}
+CORRECT_COLOUR = "#D0021B"
+KIND_COLOURS = {"hit": "#0B3C8C", "detour": "#56A3E8"}
+OTHER_KIND_COLOUR = "#009E73"
+OBSTACLE_COLOUR = "#8C8C8C"
+START_COLOUR, GOAL_COLOUR = "#E24A33", "#2CA02C"
+
+WIDTH = 7.0
+"""Inches: both columns of a page."""
+
+
+def _styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Let a function draw in our style, whatever the caller's settings are."""
+
+    @functools.wraps(draw)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+        with mpl.rc_context(mpl.rcParamsDefault | STYLE):
+            return draw(*args, **kwargs)
+
+    return wrapper
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Errors of one setting over its trials.
+
+    Attributes
+    ----------
+    label, colour
+        How it is drawn.
+    errors
+        d, `[trial, iteration]`, zero once a trial has converged.
+    traced
+        The trial that is drawn as a line.
+    published
+        Iteration at which the paper's curve is zero, if it is published.
+    """
+
+    label: str
+    colour: str
+    errors: NDArray[np.float64]
+    traced: int = 0
+    published: int | None = None
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Iterations of one setting, [trial], with the published mean if there is one."""
+
+    label: str
+    colour: str
+    iterations: NDArray[np.int64]
+    published: float | None = None
+
+
+@_styled
+def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "svg")) -> list[Path]:
+    """Write a figure as `path` with each of the suffixes; returns the files."""
+    metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+    written = []
+    for suffix in formats:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=suffix, metadata=metadata[suffix])
+        written.append(write_file(path.with_suffix(f".{suffix}"), buffer.getvalue()))
+    return written
+
+
+@_styled
+def maze_figure(demos: Demos) -> Figure:
+    """Draw the map with the correct demonstration, and again with incorrect ones (Figs. 4 and 8)."""
+    figure, axes = _figure(1, 2, height=4.0)
+    for panel, title in zip(axes, ("(a) correct", "(b) correct and incorrect"), strict=True):
+        _draw_map(panel, demos.environment)
+        panel.set_title(title)
+    on_path = {int(state) for demo in demos.correct for state in demo.states}
+    for demo in demos.incorrect:
+        _draw_departure(axes[1], demos.environment, demo, on_path)
+    for panel in axes:
+        for demo in demos.correct:
+            _draw_arrows(panel, demos.environment, demo)
+    handles = [Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct")]
+    for kind in demos.kinds:
+        mark = "x" if kind == "hit" else ""
+        number = sum(demo.kind == kind for demo in demos.incorrect)
+        handles.append(
+            Line2D([], [], color=_kind_colour(kind), marker=mark, label=f"{kind} ({number})")
+        )
+    _legend_below(figure, handles)
+    return figure
+
+
+@_styled
+def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
+    """Draw the error against the iteration (Figs. 5 and 9), one panel for each title.
+
+    The line is one trial, declared before the run; the band holds the middle half of all trials.
+    Triangles on the axis mark where the paper's own curves reach zero.
+    """
+    figure, axes = _figure(1, len(panels), height=3.0, sharey=True)
+    for panel, (title, curves) in zip(axes, panels.items(), strict=True):
+        for one in curves:
+            iterations = np.arange(one.errors.shape[1])
+            low, high = np.quantile(one.errors, [0.25, 0.75], axis=0)
+            panel.fill_between(iterations, low, high, color=one.colour, alpha=0.18, lw=0)
+            traced = one.errors[one.traced]
+            end = int(np.argmax(traced <= 0)) if (traced <= 0).any() else len(traced) - 1
+            panel.plot(iterations[: end + 1], traced[: end + 1], color=one.colour, lw=1.1)
+            panel.plot(end, traced[end], "o", color=one.colour, ms=4, clip_on=False, zorder=4)
+            if one.published is not None:
+                panel.plot(
+                    one.published,
+                    0,
+                    "v",
+                    ms=6,
+                    mfc="white",
+                    mec=one.colour,
+                    clip_on=False,
+                    zorder=5,
+                )
+        panel.set(title=title, xlabel="iteration", xlim=(0, None), ylim=(0, None))
+    axes[0].set_ylabel("error d")
+    first = next(iter(panels.values()))
+    handles = [Line2D([], [], color=one.colour, label=one.label) for one in first]
+    handles.append(
+        Line2D([], [], color="0.4", marker="o", ms=4, lw=0, label="trial 0 reaches d = 0")
+    )
+    if any(one.published is not None for one in first):
+        handles.append(
+            Line2D(
+                [], [], marker="v", ms=6, mfc="white", mec="0.4", lw=0, label="the paper's curve"
+            )
+        )
+    _legend_below(figure, handles)
+    return figure
+
+
+@_styled
+def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
+    """Draw the iterations of every trial (Figs. 6 and 9), one row for each title.
+
+    Beside each row stand the distributions, with our mean (dot) and the paper's (open triangle).
+    """
+    figure, grid = _figure(
+        len(panels), 2, height=0.7 + 2.0 * len(panels), width_ratios=(4, 1), sharey=True
+    )
+    for (left, right), (title, counts) in zip(np.atleast_2d(grid), panels.items(), strict=True):
+        for position, one in enumerate(counts):
+            left.plot(one.iterations, color=one.colour, lw=0.9)
+            _draw_distribution(right, position, one)
+        left.set_title(title, loc="left")
+        left.set(ylabel="iterations", xlim=(-1, len(counts[0].iterations)), ylim=(0, None))
+        right.set(xticks=[], xlim=(-0.7, len(counts) - 0.3))
+        right.spines["bottom"].set_visible(False)
+        right.tick_params(labelleft=False)
+    np.atleast_2d(grid)[-1, 0].set_xlabel("trial")
+    first = next(iter(panels.values()))
+    handles = [Line2D([], [], color=one.colour, label=one.label) for one in first]
+    handles.append(Line2D([], [], color="0.3", marker="o", ms=5, lw=0, label="our mean"))
+    if any(one.published is not None for counts in panels.values() for one in counts):
+        handles.append(
+            Line2D([], [], marker="v", ms=6, mfc="white", mec="0.3", lw=0, label="the paper's mean")
+        )
+    _legend_below(figure, handles)
+    return figure
+
+
+@_styled
+def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> Figure:
+    """Draw values of all states as surfaces over the maze (Fig. 7).
+
+    Parameters
+    ----------
+    maze
+        Gives the cells their places; obstacles are left out.
+    surfaces
+        Values [state] by the panel's title.
+    """
+    figure = Figure(figsize=(WIDTH, 2.9))
+    FigureCanvasAgg(figure)
+    columns, rows = np.meshgrid(np.arange(maze.shape[1]), np.arange(maze.shape[0])[::-1])
+    for position, (title, values) in enumerate(surfaces.items()):
+        panel: Any = figure.add_axes(
+            (position / len(surfaces) - 0.005, 0.06, 1 / len(surfaces) - 0.03, 0.84),
+            projection="3d",
+        )
+        height = np.where(maze.free, values, np.nan).reshape(maze.shape)
+        panel.plot_surface(
+            columns, rows, height, cmap="viridis", rstride=1, cstride=1, lw=0.1, ec="0.35"
+        )
+        panel.set_title(title, y=0.98)
+        panel.set_xlabel("x", labelpad=-10)
+        panel.set_ylabel("y", labelpad=-10)
+        panel.tick_params(labelsize=6.5, pad=-3)
+        panel.set_xticks([0, 5, 10, 15, 19])
+        panel.set_yticks([0, 5, 10, 15, 19])
+        panel.view_init(elev=28, azim=-125)
+    return figure
+
+
+@_styled
+def sets_figure(table: pd.DataFrame) -> Figure:
+    """Draw what each set of incorrect demonstrations saves, from :func:`tables.sets_table`."""
+    shown = table[table["verdict"] != ""]
+    labels = list(dict.fromkeys(shown["set"]))
+    readings = list(dict.fromkeys(shown["F"]))
+    figure, axes = _figure(1, len(readings), height=0.9 + 0.28 * len(labels), sharey=True)
+    for panel, reading in zip(axes, readings, strict=True):
+        part = shown[shown["F"] == reading].set_index("set").loc[labels]
+        saves, y = -part["difference"], np.arange(len(labels))
+        spans = np.array([saves + part["high"], -part["low"] - saves])
+        panel.errorbar(
+            saves,
+            y,
+            xerr=spans,
+            fmt="o",
+            ms=4.5,
+            color=COLOURS["unified-incorrect"],
+            elinewidth=1.2,
+        )
+        panel.axvline(0, color="0.5", lw=0.8)
+        panel.set(title=reading, xlabel="iterations saved", yticks=y)
+        panel.set_yticklabels(
+            f"{label}  ({n} leave)" for label, n in zip(labels, part["leaving"], strict=True)
+        )
+    axes[0].invert_yaxis()
+    return figure
+
+
+@_styled
+def fit_figure(fit: Fit) -> Figure:
+    """Draw a fit: the map with demonstrations and the learned path, the reward, and the errors."""
+    maze = fit.demos.environment
+    figure, axes = _figure(1, 3, height=3.0, width_ratios=(1, 1, 1))
+    _draw_map(axes[0], maze)
+    for demo in fit.demos.correct:
+        _draw_arrows(axes[0], maze, demo)
+    x, y = _places(maze, fit.states)
+    axes[0].plot(x, y, color=COLOURS["unified"], lw=3, alpha=0.4, solid_capstyle="round")
+    axes[0].set_title("correct demo (red), learned path (blue)")
+    value = np.where(maze.free, fit.weights.max(axis=1), np.nan).reshape(maze.shape)
+    image = axes[1].imshow(value[::-1], cmap="viridis", origin="lower")
+    axes[1].set(title="reward weight, best action", xticks=[], yticks=[])
+    figure.colorbar(image, ax=axes[1], fraction=0.046)
+    axes[2].plot(fit.errors, color=COLOURS["unified"])
+    axes[2].set(title="error d", xlabel="iteration", xlim=(0, None), ylim=(0, None))
+    return figure
+
+
+def _figure(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tuple[Figure, Any]:
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(n_rows, n_columns, **layout)
+    return figure, np.atleast_1d(axes)
+
+
+def _legend_below(figure: Figure, handles: list[Line2D]) -> None:
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
+
+
+def _places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return x and y of states, y upwards as in the paper."""
+    rows, columns = np.divmod(states, maze.shape[1])
+    return columns, maze.shape[0] - 1 - rows
+
+
+def _draw_map(panel: Axes, maze: Maze) -> None:
+    n_rows, n_columns = maze.shape
+    x, y = _places(maze, np.flatnonzero(~maze.free))
+    for left, bottom in zip(x, y, strict=True):
+        panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=OBSTACLE_COLOUR, lw=0))
+    for state, colour, letter in (
+        (maze.start, START_COLOUR, "S"),
+        (maze.goal, GOAL_COLOUR, "G"),
+    ):
+        ((left,), (bottom,)) = _places(maze, np.array([state]))
+        panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=colour, alpha=0.55, lw=0))
+        panel.annotate(
+            letter, (left, bottom), (0, -7.5), textcoords="offset points", ha="center", va="center"
+        )
+    for line in range(n_columns + 1):
+        panel.axvline(line - 0.5, color="0.9", lw=0.4, zorder=0)
+    for line in range(n_rows + 1):
+        panel.axhline(line - 0.5, color="0.9", lw=0.4, zorder=0)
+    panel.set(xlim=(-0.5, n_columns - 0.5), ylim=(-0.5, n_rows - 0.5), aspect="equal")
+    panel.set(xticks=range(0, n_columns, 5), yticks=range(0, n_rows, 5))
+    panel.set(xlabel="x (cells)", ylabel="y (cells)")
+    panel.spines[:].set(visible=True, linewidth=2, color="0.25")
+    panel.tick_params(length=2)
+
+
+def _draw_arrows(panel: Axes, maze: Maze, demo: Demo) -> None:
+    x, y = _places(maze, demo.states)
+    panel.quiver(
+        x[:-1],
+        y[:-1],
+        np.diff(x),
+        np.diff(y),
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        width=0.007,
+        headwidth=4.5,
+        headlength=5,
+        headaxislength=4.5,
+        color=CORRECT_COLOUR,
+        zorder=5,
+    )
+
+
+def _draw_departure(panel: Axes, maze: Maze, demo: Demo, on_path: set[int]) -> None:
+    """Draw a demonstration where it is off the correct path, with a cross where it bumps."""
+    x, y = (values.astype(float) for values in _places(maze, demo.states))
+    off = np.array([int(state) not in on_path for state in demo.states])
+    moves = off[:-1] | off[1:] | (demo.states[:-1] == demo.states[1:])
+    if not moves.any():  # it goes back along the path: draw it beside
+        moves[:] = True
+        x, y = x + 0.25, y - 0.25
+    colour = _kind_colour(demo.kind)
+    for t in np.flatnonzero(moves):
+        panel.plot(x[t : t + 2], y[t : t + 2], color=colour, lw=1.3, solid_capstyle="round")
+        if demo.states[t] == demo.states[t + 1]:
+            panel.plot(x[t], y[t], "x", color=colour, ms=5, mew=1.5, zorder=4)
+
+
+def _kind_colour(kind: str) -> str:
+    return KIND_COLOURS.get(kind, OTHER_KIND_COLOUR)
+
+
+def _draw_distribution(panel: Axes, position: int, counts: Counts) -> None:
+    values, numbers = np.unique(counts.iterations, return_counts=True)
+    half = 0.42 * numbers / numbers.max()
+    panel.barh(values, 2 * half, left=position - half, height=0.9, color=counts.colour, alpha=0.35)
+    panel.plot(position, counts.iterations.mean(), "o", color=counts.colour, ms=5, zorder=4)
+    if counts.published is not None:
+        panel.plot(
+            position + 0.3, counts.published, "v", ms=6, mfc="white", mec=counts.colour, zorder=5
+        )

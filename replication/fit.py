@@ -1,0 +1,167 @@
+"""Learn a reward from a demonstration file: the package's front door for a user's own task."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication.demos import Demos, demos_document, parse_demos
+from replication.files import write_file
+from replication.irl import run
+from replication.params import Params
+from replication.seeds import trial_seeds
+from replication.setting import Setting
+
+FORMAT = "replication-fit"
+VERSION = 1
+
+
+class FitError(ValueError):
+    """A file that does not hold a fit; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was learned from demonstrations, and all that is needed to learn it again.
+
+    Attributes
+    ----------
+    demos, method, params, seed
+        What it was learned from.
+    weights, q
+        Reward weights and Q-table, `[state, action]`.
+    states, actions
+        The last greedy trajectory, [T + 1] and [T].
+    errors
+        The history: d (Eq. 6) before each iteration and after the last one.
+    converged
+        Whether the last error is within the threshold.
+    """
+
+    demos: Demos
+    method: str
+    params: Params
+    seed: int
+    weights: NDArray[np.float64]
+    q: NDArray[np.float64]
+    states: NDArray[np.int64]
+    actions: NDArray[np.int64]
+    errors: NDArray[np.float64]
+    converged: bool
+
+    @property
+    def iterations(self) -> int:
+        """Number of weight updates."""
+        return len(self.errors) - 1
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fit as one JSON file; numbers keep every bit."""
+        document = {
+            "format": FORMAT,
+            "version": VERSION,
+            "method": self.method,
+            "seed": self.seed,
+            "params": self.params.values(),
+            "iterations": self.iterations,
+            "converged": self.converged,
+            **{name: getattr(self, name).tolist() for name in _ARRAYS},
+            "demos": demos_document(self.demos),
+        }
+        lines = [f'  "{key}": {json.dumps(value)}' for key, value in document.items()]
+        return write_file(path, "{\n" + ",\n".join(lines) + "\n}\n")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fit:
+        """Read a fit that was saved.
+
+        Raises
+        ------
+        FitError
+            If the file holds no fit of this version.
+        """
+        try:
+            document: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+            if (document["format"], document["version"]) != (FORMAT, VERSION):
+                raise ValueError(f"it is not a {FORMAT} file of version {VERSION}")
+            arrays: dict[str, Any] = {
+                name: np.array(document[name], dtype=kind) for name, kind in _ARRAYS.items()
+            }
+            return cls(
+                demos=parse_demos(json.dumps(document["demos"]).encode()),
+                method=document["method"],
+                params=Params.of(**document["params"]),
+                seed=document["seed"],
+                converged=document["converged"],
+                **arrays,
+            )
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise FitError(f"{path}: cannot be read as a fit ({error!r}); save it again") from None
+
+
+_ARRAYS: dict[str, type] = {
+    "errors": np.float64,
+    "states": np.int64,
+    "actions": np.int64,
+    "weights": np.float64,
+    "q": np.float64,
+}
+
+
+def fit(
+    demos: Demos, *, method: str = "unified-incorrect", params: Params | None = None, seed: int = 0
+) -> Fit:
+    """Learn reward weights and a policy from demonstrations.
+
+    Parameters
+    ----------
+    demos
+        Correct and incorrect demonstrations, from :func:`replication.load_demos`.
+    method
+        A name in :data:`replication.METHODS`.
+    params
+        Parameters; by default the registered ones with every incorrect demonstration of the file.
+    seed
+        Root seed: the result equals trial 0 of :func:`replication.trials.run_trials` with it.
+
+    Raises
+    ------
+    ChoiceError
+        If the method is unknown.
+    DemoError
+        If the demonstrations lack a kind that the parameters ask for.
+
+    Examples
+    --------
+    >>> from replication import Maze, demonstrate, fit
+    >>> demos = demonstrate(
+    ...     "small",
+    ...     Maze.from_text('''
+    ...     ..G
+    ...     S..
+    ... '''),
+    ... )
+    >>> result = fit(demos, seed=1)
+    >>> result.converged, result.actions.tolist() == demos.correct[0].actions.tolist()
+    (True, True)
+    """
+    chosen = params if params is not None else Params.of(incorrect="all")
+    setting = Setting(demos, method, chosen)
+    ((_, trial),) = run(setting.task, [setting.trial(seed=trial_seeds(seed, 1)[0])])
+    return Fit(
+        demos=demos,
+        method=method,
+        params=chosen,
+        seed=seed,
+        weights=trial.weights,
+        q=trial.q,
+        states=trial.states,
+        actions=trial.actions,
+        errors=trial.errors,
+        converged=trial.converged,
+    )

@@ -1,0 +1,187 @@
+"""The loop of Algorithms 1 and 2, one for all methods and tasks.
+
+A trial is a generator: it yields the reward weights from which Q is to be learned and is sent the
+learned table. So the loop reads as the listings do, one trial at a time, while :func:`run` collects
+the requests of many trials and lets the task learn them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication.expectations import feature_expectations
+from replication.irl.methods import Method
+from replication.params import Params
+from replication.qlearning import stream
+from replication.seeds import child
+from replication.tasks import Task
+
+Array = NDArray[np.float64]
+
+
+class Request(NamedTuple):
+    """What a trial asks of the learner: Q from reward weights, going on from a table and stream."""
+
+    weights: Array
+    q: Array
+    stream: NDArray[np.uint64]
+
+
+class Answer(NamedTuple):
+    """The learned table, the stream's new position and the number of learning steps."""
+
+    q: Array
+    stream: NDArray[np.uint64]
+    steps: int
+
+
+@dataclass(frozen=True)
+class Snapshots:
+    """What one trial went through: entry i is the state after i weight updates.
+
+    `weights` and `q` are `[iteration, state, action]`; `states` and `actions` hold one trajectory
+    for each iteration, of T + 1 and T entries.
+    """
+
+    weights: Array
+    q: Array
+    states: tuple[NDArray[np.int64], ...]
+    actions: tuple[NDArray[np.int64], ...]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """The outcome of one trial.
+
+    Attributes
+    ----------
+    errors
+        d_0 ... d_n (Eq. 6), one for each trajectory of the agent; n is the number of iterations.
+    converged
+        Whether the last error is within the threshold; else the trial ended at the cap.
+    steps
+        Learning steps in the environment, over all iterations.
+    weights, q
+        The last reward weights and Q-table, `[state, action]`.
+    states, actions
+        The last trajectory, [T + 1] and [T].
+    snapshots
+        Every iteration, where they were asked for.
+    """
+
+    errors: Array
+    converged: bool
+    steps: int
+    weights: Array
+    q: Array
+    states: NDArray[np.int64]
+    actions: NDArray[np.int64]
+    snapshots: Snapshots | None = None
+
+    @property
+    def iterations(self) -> int:
+        """Number of weight updates (choice ITERATION-COUNT)."""
+        return len(self.errors) - 1
+
+
+def iterate(
+    task: Task,
+    method: Method,
+    mu_e: Array,
+    mu_b: NDArray[np.bool_],
+    params: Params,
+    *,
+    seed: np.random.SeedSequence,
+    keep: bool = False,
+) -> Generator[Request, Answer, Trial]:
+    """Run one trial of Algorithm 1 or 2; the generator returns its :class:`Trial`.
+
+    Parameters
+    ----------
+    task
+        Rolls Q out to a trajectory; it is :func:`run` that lets it learn.
+    method
+        The weight update.
+    mu_e, mu_b
+        Feature expectations of the correct demonstrations (Eq. 5) and the pairs that the incorrect
+        ones visit (Eq. 11), `[state, action]`.
+    params
+        Parameters of the loop and of the update.
+    seed
+        The trial's own seed: its learning, its trajectories and its first weights draw from three
+        children of it.
+    keep
+        Whether to keep the snapshots of every iteration.
+
+    Notes
+    -----
+    ITERATION-COUNT: an iteration is one weight update, the counter i of the listings.
+    """
+    learning, rolling = stream(child(seed, 0)), stream(child(seed, 1))
+    memory = method.start(task.shape, params.update)
+    seen = mu_b if method.uses_incorrect else np.zeros_like(mu_b)
+    w = _start_weights(task.shape, params, seed=child(seed, 2))
+    q = np.zeros(task.shape)
+    errors: list[float] = []
+    kept: list[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
+    steps = 0
+    for i in range(params.loop.max_iterations + 1):
+        states, actions, rolling = task.roll_out(q, rolling)
+        mu_i = feature_expectations(
+            states, actions, gamma=params.learner.gamma, shape=task.shape
+        )  # Eq. 7
+        errors.append(float(np.linalg.norm(mu_e - mu_i)))  # Eq. 6
+        if keep:
+            kept.append((w, q, states, actions))
+        converged = errors[-1] <= params.loop.threshold
+        if converged or i == params.loop.max_iterations:
+            break
+        w, memory = method.update(w, memory, mu_e, mu_i, seen, params.update)
+        if params.loop.w_norm == "unit":
+            w = w / np.linalg.norm(w)
+        begin = np.zeros(task.shape) if params.learner.q_start == "reset" else q
+        q, learning, n = yield Request(w, begin, learning)
+        steps += n
+    snapshots = None
+    if keep:
+        weights, tables, all_states, all_actions = zip(*kept, strict=True)
+        snapshots = Snapshots(np.array(weights), np.array(tables), all_states, all_actions)
+    return Trial(np.array(errors), converged, steps, w, q, states, actions, snapshots)
+
+
+def run(
+    task: Task, trials: Iterable[Generator[Request, Answer, Trial]]
+) -> Iterator[tuple[int, Trial]]:
+    """Run trials side by side, yielding each one's position and outcome as it finishes.
+
+    The trials learn in one call of `task.learn` an iteration; what comes out of a trial does not
+    depend on the others.
+    """
+    live = dict(enumerate(trials))
+    answers: dict[int, Answer | None] = dict.fromkeys(live)
+    while live:
+        requests: dict[int, Request] = {}
+        for position, trial in list(live.items()):
+            try:
+                requests[position] = trial.send(answers[position])  # type: ignore[arg-type]
+            except StopIteration as stop:
+                del live[position]
+                yield position, stop.value
+        if requests:
+            batch = (np.stack(part) for part in zip(*requests.values(), strict=True))
+            learned = zip(requests, *task.learn(*batch), strict=True)
+            answers = {position: Answer(q, s, int(n)) for position, q, s, n in learned}
+
+
+def _start_weights(
+    shape: tuple[int, int], params: Params, *, seed: np.random.SeedSequence
+) -> Array:
+    """Return the reward weights before the first iteration (choice W-START)."""
+    if params.loop.w_start == "zero":
+        return np.zeros(shape)
+    return np.random.default_rng(seed).uniform(0.0, 0.001, size=shape)

@@ -1,0 +1,191 @@
+"""From trials to what the figures show: the plotted numbers, and each figure in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from replication.comparisons import F_INDICES, F_LABELS, Key
+from replication.demos import Demos
+from replication.envs.maze import Maze
+from replication.figures import COLOURS, Counts, Curves
+from replication.irl import Trial, get_method
+from replication.params import Report
+from replication.setting import Setting
+from replication.trials import TRACED_TRIAL, Results
+
+
+def error_panels(
+    results: Results,
+    settings: Mapping[Key, Setting],
+    methods: Sequence[str],
+    published: Mapping[str, int],
+) -> dict[str, list[Curves]]:
+    """Return the errors of some methods, a panel for each reading of Eq. 9 (Figs. 5 and 9).
+
+    `published` gives the iteration at which the paper's own curve is zero.
+    """
+    return {
+        F_LABELS[f]: [
+            Curves(
+                get_method(name).label,
+                COLOURS[name],
+                results.errors(_setting(settings, name, f)),
+                TRACED_TRIAL,
+                published.get(name),
+            )
+            for name in methods
+        ]
+        for f in F_INDICES
+    }
+
+
+def iteration_panels(
+    results: Results,
+    settings: Mapping[Key, Setting],
+    methods: Sequence[str],
+    published: Mapping[str, float],
+) -> dict[str, list[Counts]]:
+    """Return the iterations of some methods, a panel for each reading of Eq. 9 (Figs. 6 and 9).
+
+    `published` gives the paper's means.
+    """
+    return {
+        F_LABELS[f]: [
+            Counts(
+                get_method(name).label,
+                COLOURS[name],
+                results.iterations(_setting(settings, name, f)),
+                published.get(name),
+            )
+            for name in methods
+        ]
+        for f in F_INDICES
+    }
+
+
+def surfaces(trial: Trial, report: Report) -> dict[str, NDArray[np.float64]]:
+    """Return Q in the mid-term, Q at the end and the reward at the end, each [state] (Fig. 7).
+
+    Parameters
+    ----------
+    trial
+        A trial with snapshots.
+    report
+        What stands for a state's actions (FIG7-SURFACE), and when mid-term is (FIG7-MIDTERM).
+    """
+    assert trial.snapshots is not None, "surfaces need a trial that kept its snapshots"
+    reduce = {"max": np.max, "mean": np.mean}[report.surface]
+    middle = round(report.mid_term * trial.iterations)
+    return {
+        f"(a) Q after {middle} iterations": reduce(trial.snapshots.q[middle], axis=1),
+        f"(b) Q at the end ({trial.iterations})": reduce(trial.q, axis=1),
+        "(c) reward at the end": reduce(trial.weights, axis=1),
+    }
+
+
+def demo_numbers(demos: Demos) -> pd.DataFrame:
+    """Return demonstrations as rows: kind, demo, step, and x, y in cells from the lower left."""
+    maze = demos.environment
+    rows = []
+    for demo in (*demos.correct, *demos.incorrect):
+        for step, state in enumerate(demo.states):
+            row, column = maze.cell(int(state))
+            rows.append((demo.kind, demo.name, step, column, maze.shape[0] - 1 - row))
+    return pd.DataFrame(rows, columns=["kind", "demo", "step", "x", "y"])
+
+
+def error_numbers(panels: Mapping[str, Sequence[Curves]]) -> pd.DataFrame:
+    """Return what an error figure shows: the traced trial and the quartiles at each iteration."""
+    parts = []
+    for title, curves in panels.items():
+        for one in curves:
+            low, middle, high = np.quantile(one.errors, [0.25, 0.5, 0.75], axis=0)
+            columns = {
+                "F": title,
+                "method": one.label,
+                "iteration": np.arange(len(low)),
+                f"trial_{one.traced}": one.errors[one.traced],
+                "quartile_1": low,
+                "median": middle,
+                "quartile_3": high,
+            }
+            parts.append(pd.DataFrame(columns))
+    return pd.concat(parts)
+
+
+def iteration_numbers(panels: Mapping[str, Sequence[Counts]]) -> pd.DataFrame:
+    """Return what a figure of iterations shows: one row a trial."""
+    parts = [
+        pd.DataFrame(
+            {
+                "F": title,
+                "method": one.label,
+                "trial": np.arange(len(one.iterations)),
+                "iterations": one.iterations,
+            }
+        )
+        for title, counts in panels.items()
+        for one in counts
+    ]
+    return pd.concat(parts)
+
+
+def surface_numbers(maze: Maze, values: Mapping[str, NDArray[np.float64]]) -> pd.DataFrame:
+    """Return what the surfaces show: one row a cell, x and y in cells from the lower left."""
+    rows, columns = np.divmod(np.arange(maze.n_states), maze.shape[1])
+    table = pd.DataFrame({"x": columns, "y": maze.shape[0] - 1 - rows, **values})
+    return table[maze.free]
+
+
+def describe_demos(demos: Demos) -> str:
+    """Return a map of demonstrations in words."""
+    moves = len(demos.correct[0].actions)
+    counts = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
+    incorrect = f"; incorrect ones: {', '.join(counts)}" if counts else ""
+    return f"Map of {demos.task} with a correct demonstration of {moves} moves{incorrect}."
+
+
+def describe_errors(panels: Mapping[str, Sequence[Curves]]) -> str:
+    """Return a figure of errors in words: when half of the trials have reached zero."""
+    parts = [
+        f"{one.label}, {title}: half of the trials are at zero after "
+        f"{int((np.median(one.errors, axis=0) > 0).sum())} iterations"
+        for title, curves in panels.items()
+        for one in curves
+    ]
+    return f"Error d against iteration. {'; '.join(parts)}."
+
+
+def describe_iterations(panels: Mapping[str, Sequence[Counts]]) -> str:
+    """Return a figure of iterations in words: the means."""
+    parts = [
+        f"{one.label}, {title}: {one.iterations.mean():.1f} on average"
+        for title, counts in panels.items()
+        for one in counts
+    ]
+    return f"Iterations of each trial. {'; '.join(parts)}."
+
+
+def describe_surfaces(values: Mapping[str, NDArray[np.float64]]) -> str:
+    """Return the surfaces in words: the range of their values."""
+    parts = [f"{title}: {one.min():.3g} to {one.max():.3g}" for title, one in values.items()]
+    return f"Surfaces over the maze. {'; '.join(parts)}."
+
+
+def describe_sets(table: pd.DataFrame) -> str:
+    """Return the figure of :func:`replication.tables.sets_table` in words."""
+    parts = [
+        f"{row.set}, {row.F}: {-row.difference:.1f} ({-row.high:.1f} to {-row.low:.1f})"
+        for row in table.itertuples()
+        if row.verdict
+    ]
+    return f"Iterations saved by incorrect demonstrations, with 95 % intervals. {'; '.join(parts)}."
+
+
+def _setting(settings: Mapping[Key, Setting], method: str, f: str) -> Setting:
+    """Return a method's setting under a reading of Eq. 9, or its only one if it has no trace."""
+    return settings[method, f] if (method, f) in settings else settings[method, ""]

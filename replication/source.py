@@ -1,0 +1,79 @@
+"""A hash of the code that computes a trial.
+
+The hash covers every module of the package that a given module imports, directly or not, without
+docstrings, comments and layout. So finished trials stay valid when prose or drawing code changes,
+and are never used again when what computes them does.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+PACKAGE = __name__.split(".")[0]
+
+
+@cache
+def source_hash(module: str) -> str:
+    """Return the SHA-256 of `module` and of all modules of the package that it imports.
+
+    The data files beside the package's modules are not code and do not count.
+    """
+    digest = hashlib.sha256()
+    for name, tree in sorted(_closure(module).items()):
+        digest.update(f"{name}\n{ast.unparse(_bare(tree))}\n".encode())
+    return digest.hexdigest()
+
+
+def _closure(module: str) -> dict[str, ast.Module]:
+    found: dict[str, ast.Module] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in found:
+            continue
+        spec = find_spec(name)
+        if spec is None or spec.origin is None:
+            continue  # `from package import function` names no module
+        found[name] = ast.parse(Path(spec.origin).read_bytes())
+        waiting.extend(_imports(found[name]))
+    return found
+
+
+def _imports(tree: ast.Module) -> set[str]:
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return {name for name in names if name.startswith(f"{PACKAGE}.") and _is_module(name)}
+
+
+def _is_module(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def _bare(tree: ast.Module) -> ast.Module:
+    """Return the tree without docstrings and other expressions that only hold text."""
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            kept = [
+                one
+                for one in body
+                if not (
+                    isinstance(one, ast.Expr)
+                    and isinstance(one.value, ast.Constant)
+                    and isinstance(one.value.value, str)
+                )
+            ]
+            node.body = kept or [ast.Pass()]  # type: ignore[attr-defined]
+    return tree

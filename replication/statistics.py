@@ -1,0 +1,188 @@
+"""Statistics of iteration counts: summaries, paired comparisons, and the criterion for a verdict.
+
+All methods share their seeds, so comparisons are paired by trial. Intervals are 95 %. A trial that
+ended at the iteration cap has no count: where there is one, means are not computed and a comparison
+is not testable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+CONFIDENCE = 0.95
+RESAMPLES = 9999
+BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
+
+REPRODUCED = "reproduced"
+REVERSED = "reversed"
+NOT_REPRODUCED = "not reproduced"
+NOT_TESTABLE = "not testable"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Iterations of one setting; `mean`, `sd` and the mean's interval are NaN if any are capped."""
+
+    n: int
+    capped: int
+    mean: float
+    low: float
+    high: float
+    sd: float
+    median: float
+    quartile_1: float
+    quartile_3: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Iterations of `x` against those of `y`, trial by trial.
+
+    Attributes
+    ----------
+    difference, low, high
+        Mean of x - y with its BCa bootstrap interval.
+    fewer
+        Probability that a trial of x needs fewer iterations than one of y, ties counting half.
+    p_welch, p_wilcoxon
+        Two-sided p-values of Welch's t-test and of the paired signed-rank test.
+    sd_ratio, p_spread
+        SD of x over SD of y, and the p-value of the Brown-Forsythe test of equal spread.
+    power
+        Probability that a paired t-test at 5 % would find a true difference as large as the
+        published one, given the spread of our differences; NaN where none is published.
+    """
+
+    difference: float
+    low: float
+    high: float
+    fewer: float
+    p_welch: float
+    p_wilcoxon: float
+    sd_ratio: float
+    p_spread: float
+    power: float
+
+
+def summarise(iterations: ArrayLike, converged: ArrayLike) -> Summary:
+    """Summarise the iterations of one setting, [trial], with whether each trial converged."""
+    counts, done = np.asarray(iterations, dtype=float), np.asarray(converged, dtype=bool)
+    quartiles = np.quantile(counts, [0.5, 0.25, 0.75])
+    if done.all():
+        mean, sd = counts.mean(), counts.std(ddof=1)
+        half = stats.t.ppf((1 + CONFIDENCE) / 2, len(counts) - 1) * sd / np.sqrt(len(counts))
+        moments = (mean, mean - half, mean + half, sd)
+    else:
+        moments = (np.nan,) * 4
+    return Summary(len(counts), int((~done).sum()), *map(float, moments), *map(float, quartiles))
+
+
+def compare(
+    x: ArrayLike, y: ArrayLike, *, capped: bool = False, published: float = np.nan
+) -> Comparison:
+    """Compare paired iteration counts `x` and `y`, both [trial].
+
+    Parameters
+    ----------
+    x, y
+        Iterations of two settings over the same seeds.
+    capped
+        Whether any trial of either ended at the cap; then every statistic is NaN.
+    published
+        The paper's own difference of means, for the power.
+    """
+    a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if capped:
+        return Comparison(*(np.nan,) * 9)
+    low, high = mean_interval(a - b)
+    equal = bool((a == b).all())
+    flat = a.std() == 0 or b.std() == 0
+    return Comparison(
+        difference=float((a - b).mean()),
+        low=low,
+        high=high,
+        fewer=float((a[:, None] < b).mean() + 0.5 * (a[:, None] == b).mean()),
+        p_welch=1.0 if equal else float(stats.ttest_ind(a, b, equal_var=False).pvalue),
+        p_wilcoxon=1.0 if equal else float(stats.wilcoxon(a, b).pvalue),
+        sd_ratio=np.nan if flat else float(a.std(ddof=1) / b.std(ddof=1)),
+        p_spread=np.nan if flat else float(stats.levene(a, b, center="median").pvalue),
+        power=power(a - b, published),
+    )
+
+
+def mean_interval(differences: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the BCa bootstrap interval of a mean; a constant sample is its own interval."""
+    if np.ptp(differences) == 0:
+        return float(differences[0]), float(differences[0])
+    interval = stats.bootstrap(
+        (differences,),
+        np.mean,
+        confidence_level=CONFIDENCE,
+        n_resamples=RESAMPLES,
+        method="BCa",
+        rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
+    ).confidence_interval
+    return float(interval.low), float(interval.high)
+
+
+def power(differences: NDArray[np.float64], effect: float) -> float:
+    """Return the power of a two-sided paired t-test at 5 % for a true mean difference `effect`."""
+    n, sd = len(differences), differences.std(ddof=1)
+    if not np.isfinite(effect) or sd == 0:
+        return float("nan")
+    critical = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)
+    shift = abs(effect) / sd * np.sqrt(n)
+    return float(stats.nct.sf(critical, n - 1, shift) + stats.nct.cdf(-critical, n - 1, shift))
+
+
+def verdict_fewer(comparison: Comparison) -> str:
+    """Judge "x needs fewer iterations than y".
+
+    The criterion: reproduced if the whole interval of the mean difference lies below zero,
+    reversed if it lies above, not reproduced if it contains zero.
+    """
+    if np.isnan(comparison.difference):
+        return NOT_TESTABLE
+    if comparison.high < 0:
+        return REPRODUCED
+    return REVERSED if comparison.low > 0 else NOT_REPRODUCED
+
+
+def verdict_steadier(comparison: Comparison) -> str:
+    """Judge "the iterations of x spread less than those of y".
+
+    The criterion: reproduced if the SD of x is the smaller one and the Brown-Forsythe test rejects
+    equal spread at 5 %, reversed if it is the larger one and the test rejects, else not reproduced.
+    """
+    if np.isnan(comparison.p_spread):
+        return NOT_TESTABLE
+    if comparison.p_spread >= 1 - CONFIDENCE:
+        return NOT_REPRODUCED
+    return REPRODUCED if comparison.sd_ratio < 1 else REVERSED
+
+
+def prediction_interval(mean: float, sd: float, n: int, m: int) -> tuple[float, float]:
+    """Return where the mean of `m` new trials should lie, given `n` with this mean and SD."""
+    half = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1) * sd * np.sqrt(1 / n + 1 / m)
+    return float(mean - half), float(mean + half)
+
+
+def holm(p_values: Sequence[float]) -> NDArray[np.float64]:
+    """Return p-values adjusted by Holm's method for making several comparisons.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03]).tolist()
+    [0.03, 0.06, 0.06]
+    """
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(p)
+    scaled = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(scaled, 1.0)
+    return adjusted

@@ -1,0 +1,281 @@
+"""From tidy trials to the tables of the paper: computing only, no drawing and no running."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from replication.comparisons import F_LABELS, Claim, Key
+from replication.demos import Demos
+from replication.expectations import visited
+from replication.files import write_file
+from replication.irl import get_method
+from replication.paper import Published
+from replication.setting import Setting
+from replication.statistics import (
+    Comparison,
+    compare,
+    holm,
+    prediction_interval,
+    summarise,
+    verdict_fewer,
+    verdict_steadier,
+)
+
+
+def rows_of(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
+    """Return the rows of one setting in tidy trials, in the order of the trials.
+
+    Raises
+    ------
+    KeyError
+        If there are none.
+    """
+    chosen = trials[
+        (trials["task"] == setting.demos.task)
+        & (trials["method"] == setting.method)
+        & (trials["choices"].fillna("") == setting.choices)
+    ]
+    if chosen.empty:
+        raise KeyError(f"no trials of {setting.method} with choices {setting.choices!r}")
+    return chosen.sort_values("trial")
+
+
+def comparison(
+    trials: pd.DataFrame, x: Setting, y: Setting, *, published: float = np.nan
+) -> Comparison:
+    """Compare the iterations of two settings, trial by trial."""
+    a, b = rows_of(trials, x), rows_of(trials, y)
+    capped = not (a["converged"].all() and b["converged"].all())
+    return compare(a["iterations"], b["iterations"], capped=capped, published=published)
+
+
+def summary_table(
+    trials: pd.DataFrame, settings: Mapping[Key, Setting], published: Mapping[str, Published]
+) -> pd.DataFrame:
+    """Return one row a setting: our iterations beside the published ones (Tables I and II).
+
+    The prediction interval says where the mean of a replication with as many trials as ours should
+    lie if it drew from the paper's distribution; `p_paper` is Welch's test of equal means.
+    """
+    rows = []
+    for (method, f), setting in settings.items():
+        own = rows_of(trials, setting)
+        ours = summarise(own["iterations"], own["converged"])
+        row = {"method": get_method(method).label, "F": F_LABELS[f], **asdict(ours)}
+        if method in published:
+            paper = published[method]
+            low, high = prediction_interval(paper.mean, paper.sd, paper.n, ours.n)
+            test = stats.ttest_ind_from_stats(
+                ours.mean, ours.sd, ours.n, paper.mean, paper.sd, paper.n, equal_var=False
+            )
+            row |= {"paper_mean": paper.mean, "paper_sd": paper.sd}
+            row |= {"predicted_low": low, "predicted_high": high, "p_paper": test.pvalue}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def claims_table(
+    trials: pd.DataFrame,
+    settings: Mapping[Key, Setting],
+    claims: Iterable[Claim],
+    published: Mapping[str, Published],
+) -> pd.DataFrame:
+    """Return one row for each claim and reading of Eq. 9, with its verdict.
+
+    `p` is the test that belongs to the criterion (Welch's for means, Brown-Forsythe's for spread),
+    `p_holm` the same adjusted over all rows. Verdicts follow the criterion alone.
+    """
+    rows = []
+    for claim in claims:
+        for f in dict.fromkeys(f for method, f in settings if method == claim.x):
+            x = settings[claim.x, f]
+            y = settings[claim.y, f] if (claim.y, f) in settings else settings[claim.y, ""]
+            both = claim.x in published and claim.y in published
+            effect = published[claim.x].mean - published[claim.y].mean if both else np.nan
+            found = comparison(trials, x, y, published=effect)
+            fewer = claim.judged == "fewer"
+            rows.append(
+                {
+                    "claim": claim.text,
+                    "place": claim.place or "ours",
+                    "F": F_LABELS[f],
+                    "judged": claim.judged,
+                    **asdict(found),
+                    "paper_difference": effect,
+                    "p": found.p_welch if fewer else found.p_spread,
+                    "verdict": verdict_fewer(found) if fewer else verdict_steadier(found),
+                }
+            )
+    table = pd.DataFrame(rows)
+    table.insert(len(table.columns) - 1, "p_holm", holm(table["p"].tolist()))
+    return table
+
+
+def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.DataFrame:
+    """Return one row for each set of incorrect demonstrations and reading of Eq. 9.
+
+    Beside the difference from no incorrect demonstrations stand the numbers of pairs by their
+    distance from the correct path, see :func:`pairs_near`.
+    """
+    rows = []
+    for (kinds, f), setting in settings.items():
+        found = comparison(trials, setting, settings["none", f])
+        own = rows_of(trials, setting)
+        ours = summarise(own["iterations"], own["converged"])
+        rows.append(
+            {
+                "set": kinds,
+                "F": F_LABELS[f],
+                "demonstrations": len(setting.selected.incorrect),
+                **pairs_near(setting.selected),
+                "mean": ours.mean,
+                "sd": ours.sd,
+                "difference": found.difference,
+                "low": found.low,
+                "high": found.high,
+                "verdict": "" if kinds == "none" else verdict_fewer(found),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def pairs_near(demos: Demos) -> dict[str, int]:
+    """Count the pairs that incorrect demonstrations mark, by distance from the correct path.
+
+    A pair that a correct demonstration visits as well is not marked (Algorithm 2, line 11).
+
+    Returns
+    -------
+    dict
+        `pairs`: all marked pairs; `leaving`: those whose state lies on the correct path, so that
+        the pair leaves it; `beside`: those one move away from it.
+    """
+    maze = demos.environment
+    shape = maze.n_states, maze.n_actions
+    marked = visited(demos.incorrect, shape=shape) & ~visited(demos.correct, shape=shape)
+    on_path = np.zeros(maze.n_states, dtype=bool)
+    for demo in demos.correct:
+        on_path[demo.states] = True
+    beside = on_path[maze.next_state].any(axis=1) & ~on_path
+    return {
+        "pairs": int(marked.sum()),
+        "leaving": int(marked[on_path].sum()),
+        "beside": int(marked[beside].sum()),
+    }
+
+
+def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a summary table as a reader wants it: mean (SD) beside the paper's."""
+    readable = table[["method", "F"]].rename(columns={"method": "Method"})
+    readable["Mean [95 %]"] = [
+        _interval(*row) for row in zip(table["mean"], table["low"], table["high"], strict=True)
+    ]
+    readable["SD"] = table["sd"].map("{:.2f}".format)
+    readable["Median (quartiles)"] = [
+        f"{m:g} ({a:g}–{b:g})"
+        for m, a, b in zip(table["median"], table["quartile_1"], table["quartile_3"], strict=True)
+    ]
+    readable["At the cap"] = [
+        f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    ]
+    if "paper_mean" in table:
+        readable["Paper: mean (SD)"] = [
+            "–" if np.isnan(mean) else f"{mean:.2f} ({sd:.2f})"
+            for mean, sd in zip(table["paper_mean"], table["paper_sd"], strict=True)
+        ]
+        readable["Predicted mean"] = [
+            "–" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
+            for low, high in zip(table["predicted_low"], table["predicted_high"], strict=True)
+        ]
+    return readable
+
+
+def readable_claims(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of claims as a reader wants it."""
+    readable = table[["claim", "place", "F"]].rename(columns={"claim": "Claim", "place": "Place"})
+    readable["Difference [95 %]"] = [
+        _interval(*row)
+        for row in zip(table["difference"], table["low"], table["high"], strict=True)
+    ]
+    readable["Paper"] = [
+        "–" if np.isnan(effect) else f"{effect:.2f}" for effect in table["paper_difference"]
+    ]
+    readable["P(fewer)"] = table["fewer"].map("{:.2f}".format)
+    readable["SD ratio"] = table["sd_ratio"].map("{:.2f}".format)
+    readable["p (Holm)"] = [
+        f"{p} ({h})" for p, h in zip(table["p"].map(_p), table["p_holm"].map(_p), strict=True)
+    ]
+    readable["Power"] = [
+        "–" if np.isnan(power) or judged == "steadier" else f"{power:.2f}"
+        for power, judged in zip(table["power"], table["judged"], strict=True)
+    ]
+    readable["Verdict"] = table["verdict"]
+    return readable
+
+
+def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of sets as a reader wants it, both readings of Eq. 9 in one row."""
+    keys = ["set", "demonstrations", "pairs", "leaving", "beside"]
+    readable = table[keys].drop_duplicates().reset_index(drop=True)
+    for label, part in table.groupby("F", sort=False):
+        readable[f"{label}: mean (SD)"] = [
+            f"{mean:.2f} ({sd:.2f})" for mean, sd in zip(part["mean"], part["sd"], strict=True)
+        ]
+        readable[f"{label}: saves"] = [
+            "–" if not verdict else _interval(-difference, -high, -low)
+            for verdict, difference, low, high in zip(
+                part["verdict"], part["difference"], part["low"], part["high"], strict=True
+            )
+        ]
+    return readable.rename(columns={key: key.capitalize() for key in keys})
+
+
+def findings(table: pd.DataFrame) -> str:
+    """Return a table of claims in words, as a Markdown list."""
+    lines = []
+    for row in table.itertuples():
+        numbers = f"{row.sd_ratio:.2f} times the SD"
+        if row.judged == "fewer":
+            numbers = f"difference {_interval(row.difference, row.low, row.high)}"
+            if not np.isnan(row.paper_difference):
+                numbers += f", in the paper {row.paper_difference:.2f}"
+        lines.append(f"- **{row.verdict}** with {row.F}: {row.claim} ({numbers}).\n")
+    return "".join(lines)
+
+
+def markdown(table: pd.DataFrame) -> str:
+    """Return a table as Markdown."""
+    head = "| " + " | ".join(map(str, table.columns)) + " |"
+    rule = "|" + " --- |" * len(table.columns)
+    lines = ["| " + " | ".join(map(str, row)) + " |" for row in table.itertuples(index=False)]
+    return "\n".join([head, rule, *lines]) + "\n"
+
+
+def write_csv(table: pd.DataFrame, path: Path) -> Path:
+    """Write a table as CSV: ten significant digits, the same on every platform."""
+    return write_file(path, table.to_csv(index=False, float_format="%.10g", lineterminator="\n"))
+
+
+def write_trials(trials: pd.DataFrame, path: Path) -> Path:
+    """Write tidy trials, keeping the rows of other tasks that the file already has."""
+    if path.exists():
+        others = pd.read_csv(path, keep_default_na=False)
+        others = others[~others["task"].isin(trials["task"].unique())]
+        trials = pd.concat([others, trials])
+    return write_csv(trials.sort_values(["task", "method", "choices", "trial"]), path)
+
+
+def _interval(middle: float, low: float, high: float) -> str:
+    return "–" if np.isnan(middle) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _p(p: float) -> str:
+    if np.isnan(p):
+        return "–"
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"

@@ -1,0 +1,94 @@
+"""What the IRL loop needs of a task: learn Q from reward weights, and roll Q out.
+
+A new kind of task (a physics world, a user's own) is a class with these two methods and a line in
+:func:`make_task`; nothing in the loop or in the methods changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication import qlearning
+from replication.envs.maze import Maze
+from replication.params import Learner, Params
+
+Array = NDArray[np.float64]
+Streams = NDArray[np.uint64]
+Path = NDArray[np.int64]
+
+
+class Task(Protocol):
+    """A task with a finite number of states and actions."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of states and number of actions."""
+        ...
+
+    def learn(
+        self, weights: Array, q: Array, streams: Streams
+    ) -> tuple[Array, Streams, NDArray[np.int64]]:
+        """Return the learned tables, the streams' new positions and the steps taken.
+
+        The arrays are `[trial, state, action]`, `[trial, 4]` and `[trial]`; a trial's result must
+        not depend on the other trials.
+        """
+        ...
+
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
+        """Return states [T + 1] and actions [T] of a greedy episode, and the stream's position."""
+        ...
+
+
+@dataclass(frozen=True)
+class MazeTask:
+    """Q-learning (Eq. 1) and greedy episodes in a maze."""
+
+    maze: Maze
+    learner: Learner
+    rollout_ties: str
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of states, obstacle cells included, and number of actions."""
+        return self.maze.n_states, self.maze.n_actions
+
+    def learn(
+        self, weights: Array, q: Array, streams: Streams
+    ) -> tuple[Array, Streams, NDArray[np.int64]]:
+        """Learn by Q-learning, see :func:`replication.qlearning.learn`."""
+        return qlearning.learn(
+            self.maze.next_state,
+            weights,
+            q,
+            streams,
+            start=self.maze.start,
+            goal=self.maze.goal,
+            episodes=self.learner.episodes,
+            horizon=self.learner.horizon,
+            beta=self.learner.beta,
+            gamma=self.learner.gamma,
+            epsilon=self.learner.epsilon,
+            random_ties=self.learner.ties == "random",
+        )
+
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
+        """Follow the greedy policy, see :func:`replication.qlearning.roll_out`."""
+        return qlearning.roll_out(
+            self.maze.next_state,
+            q,
+            stream,
+            start=self.maze.start,
+            goal=self.maze.goal,
+            horizon=self.learner.horizon,
+            random_ties=self.rollout_ties == "random",
+        )
+
+
+def make_task(environment: Maze, params: Params) -> Task:
+    """Return the task that the demonstrations of `environment` belong to."""
+    return MazeTask(environment, params.learner, params.loop.rollout_ties)

@@ -1,0 +1,158 @@
+"""Many trials of many settings, in parallel, each computed once.
+
+Trial k of every setting descends from child k of one root seed, so settings are compared trial by
+trial. A trial's bits depend on its setting and seed alone: not on the number of workers, on the
+trials that it is computed together with, or on whether it was computed now or read from the store.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numba
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from replication.demos import content_hash
+from replication.irl import Trial, run
+from replication.seeds import trial_seeds
+from replication.setting import Setting
+from replication.source import source_hash
+from replication.store import Store
+
+TRACED_TRIAL = 0
+"""The one trial of a setting that keeps every iteration, declared beforehand (FIG5-TRIAL)."""
+
+CHUNK = 25
+"""Trials that one worker computes together; wide enough to keep the learner's lanes busy."""
+
+
+class Results:
+    """The trials of some settings, read from the store when they are asked for."""
+
+    def __init__(self, store: Store, settings: Sequence[Setting], trials: int, root: int) -> None:
+        self._store = store
+        self._root = root
+        self.trials = trials
+        self.settings = list(settings)
+
+    def trial(self, setting: Setting, k: int, *, snapshots: bool = False) -> Trial:
+        """Return trial `k` of a setting."""
+        return self._store.get(trial_key(setting, self._root, k), snapshots=snapshots)
+
+    def errors(self, setting: Setting) -> NDArray[np.float64]:
+        """Return d of every trial, `[trial, iteration]`, zero after a trial has converged."""
+        curves = [self.trial(setting, k).errors for k in range(self.trials)]
+        table = np.zeros((len(curves), max(map(len, curves))))
+        for row, curve in zip(table, curves, strict=True):
+            row[: len(curve)] = curve
+        return table
+
+    def iterations(self, setting: Setting) -> NDArray[np.int64]:
+        """Return the number of iterations of every trial, `[trial]`."""
+        return np.array([self.trial(setting, k).iterations for k in range(self.trials)])
+
+    def frame(self) -> pd.DataFrame:
+        """Return tidy trials, one row for each trial of each setting."""
+        rows = []
+        for setting in self.settings:
+            for k in range(self.trials):
+                trial = self.trial(setting, k)
+                rows.append(
+                    {
+                        "task": setting.demos.task,
+                        "method": setting.method,
+                        "trial": k,
+                        "seed": self._root,
+                        "iterations": trial.iterations,
+                        "converged": trial.converged,
+                        "steps": trial.steps,
+                        "choices": setting.choices,
+                    }
+                )
+        return pd.DataFrame(rows)
+
+
+def run_trials(
+    settings: Sequence[Setting],
+    *,
+    trials: int,
+    store: Store,
+    jobs: int = 1,
+    progress: bool | None = None,
+    seed: int,
+) -> Results:
+    """Compute those trials that the store does not have yet, and return all of them.
+
+    Parameters
+    ----------
+    settings
+        What to run; each gets the same seeds, and equal ones are run once.
+    trials
+        Trials 0 ... trials - 1 of each setting.
+    store
+        Where finished trials go, a chunk at a time.
+    jobs
+        Worker processes.
+    progress
+        Whether to draw a bar; None draws it on a terminal only.
+    seed
+        Root seed.
+    """
+    settings = list({trial_key(setting, seed, 0): setting for setting in settings}.values())
+    chunks = []
+    for setting in settings:
+        keys = {k: trial_key(setting, seed, k) for k in range(trials)}
+        known = store.known(keys.values())
+        missing = [k for k, key in keys.items() if key not in known]
+        for at in range(0, len(missing), CHUNK):
+            chunks.append((setting, missing[at : at + CHUNK]))
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(
+        joblib.delayed(_compute)(setting, ks, seed) for setting, ks in chunks
+    )
+    total = sum(len(ks) for _, ks in chunks)
+    disable = None if progress is None else not progress
+    with tqdm(total=total, unit="trial", disable=disable, leave=False) as bar:
+        steps = 0
+        for setting, finished in work:
+            store.put((trial_key(setting, seed, k), trial) for k, trial in finished)
+            steps += sum(trial.steps for _, trial in finished)
+            bar.update(len(finished))
+            elapsed = max(bar.format_dict["elapsed"], 1e-9)
+            bar.set_postfix_str(f"{steps / elapsed / 1e6:.0f} M steps/s")
+    return Results(store, settings, trials, seed)
+
+
+def _compute(setting: Setting, ks: list[int], root: int) -> tuple[Setting, list[tuple[int, Trial]]]:
+    """Compute trials `ks` of a setting side by side; runs in a worker."""
+    seeds = trial_seeds(root, max(ks) + 1)
+    loops = [setting.trial(seed=seeds[k], keep=k == TRACED_TRIAL) for k in ks]
+    return setting, [(ks[at], trial) for at, trial in run(setting.task, loops)]
+
+
+def trial_key(setting: Setting, root: int, k: int) -> str:
+    """Return the hash of all that determines a trial: demos, method, parameters, seed and code."""
+    params: dict[str, Any] = setting.params.values()
+    del params["incorrect"]  # the selected demonstrations stand for it
+    content = {
+        "demos": content_hash(setting.selected),
+        "method": setting.method,
+        "params": params,
+        "seed": [root, k],
+        "traced": k == TRACED_TRIAL,
+        "source": source_hash("replication.trials"),
+        "versions": {"numba": numba.__version__, "numpy": np.__version__},
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def default_store(folder: Path) -> Store:
+    """Return the store of a working copy, `build/trials.sqlite` under its folder."""
+    return Store(folder / "build" / "trials.sqlite")

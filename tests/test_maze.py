@@ -1,0 +1,260 @@
+"""Mazes: the table of moves against plain rules, refusals, and the Gymnasium environment."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from replication.envs import ACTIONS, Maze, MazeEnv, MazeError
+
+ROWS = ("...#G", ".#...", "S..#.")  # not square
+CORRIDOR = ("S...G",)
+
+CELLS = st.sampled_from("...#")
+
+
+@st.composite
+def mazes(draw: st.DrawFn) -> Maze:
+    """Any small maze, of any shape."""
+    n_columns = draw(st.integers(1, 7))
+    n_rows = draw(st.integers(1 if n_columns > 1 else 2, 7))
+    cells = draw(st.lists(CELLS, min_size=n_rows * n_columns, max_size=n_rows * n_columns))
+    start, goal = draw(
+        st.lists(st.integers(0, len(cells) - 1), min_size=2, max_size=2, unique=True)
+    )
+    cells[start], cells[goal] = "S", "G"
+    rows = tuple("".join(cells[i : i + n_columns]) for i in range(0, len(cells), n_columns))
+    try:
+        return Maze(rows)
+    except MazeError as error:
+        assume("cannot be reached" not in str(error))
+        raise
+
+
+def moved(rows: tuple[str, ...], row: int, column: int, action: str) -> tuple[int, int]:
+    """Apply the rule of a move in plain words: the oracle of the table."""
+    if rows[row][column] == "#":
+        return row, column
+    down, right = {"up": (-1, 0), "down": (1, 0), "right": (0, 1), "left": (0, -1)}[action]
+    there = row + down, column + right
+    inside = 0 <= there[0] < len(rows) and 0 <= there[1] < len(rows[0])
+    return there if inside and rows[there[0]][there[1]] != "#" else (row, column)
+
+
+@settings(max_examples=50, deadline=None)
+@given(mazes())
+def test_table_is_the_rule(maze: Maze) -> None:
+    """Each entry of the table is the plain rule of a move; obstacles lead to themselves."""
+    assert maze.next_state.shape == (maze.n_states, maze.n_actions)
+    for state in range(maze.n_states):
+        assert maze.state(*maze.cell(state)) == state
+        assert maze.cells(np.array([state])).tolist() == [list(maze.cell(state))]
+        for number, action in enumerate(ACTIONS):
+            there = moved(maze.rows, *maze.cell(state), action)
+            assert maze.next_state[state, number] == maze.state(*there)
+
+
+@settings(max_examples=50, deadline=None)
+@given(mazes())
+def test_distances_solve_the_shortest_path_equations(maze: Maze) -> None:
+    """A distance is one more than the least among the neighbours, 0 at the goal, -1 if cut off."""
+    distances = maze.distances()
+    assert distances[maze.goal] == 0
+    assert distances[maze.start] > 0
+    assert (distances[~maze.free] == -1).all()
+    for state in np.flatnonzero(maze.free):
+        near = [d for d in distances[maze.next_state[state]] if d >= 0]
+        if distances[state] > 0:
+            assert distances[state] == min(near) + 1
+        elif state != maze.goal:
+            assert not near
+
+
+@settings(max_examples=50, deadline=None)
+@given(mazes())
+def test_distances_are_symmetric(maze: Maze) -> None:
+    """The way from start to goal is as long as the way back."""
+    assert maze.distances(maze.start)[maze.goal] == maze.distances()[maze.start]
+
+
+def test_worked_example() -> None:
+    """A map solved by hand: shape, places, moves and distances."""
+    maze = Maze(ROWS)
+    assert maze.shape == (3, 5)
+    assert (maze.n_states, maze.n_actions) == (15, 4)
+    assert maze.cell(maze.start) == (2, 0)
+    assert maze.cell(maze.goal) == (0, 4)
+    assert maze.distances().reshape(3, 5).tolist() == [
+        [6, 5, 4, -1, 0],
+        [7, -1, 3, 2, 1],
+        [6, 5, 4, -1, 2],
+    ]
+    assert maze.replay([3, 2, 2]).tolist() == [10, 10, 11, 12]
+
+
+def test_corridor() -> None:
+    """In a corridor of one line, up and down stay in place."""
+    maze = Maze(CORRIDOR)
+    assert maze.next_state.tolist() == [
+        [0, 0, 1, 0],
+        [1, 1, 2, 0],
+        [2, 2, 3, 1],
+        [3, 3, 4, 2],
+        [4, 4, 4, 3],
+    ]
+    standing = Maze(tuple(CORRIDOR[0]))
+    assert standing.next_state[0].tolist() == [0, 1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ((), "the map is empty"),
+        (("",), "the map is empty"),
+        (("S.", "..G"), "map line 2 has 3 characters, but line 1 has 2"),
+        (("S..", ".xG"), "unknown character 'x' at map line 2, column 2"),
+        (("S..", ".\nG"), r"unknown character '\n' at map line 2, column 2"),
+        (("...", "..G"), "no start; mark one cell with 'S'"),
+        (("S..", "..."), "no goal; mark one cell with 'G'"),
+        (("S..", "S.G"), "2 starts 'S', at map line 1, column 1 and at map line 2, column 1"),
+        (("S.G", "..G"), "2 goals 'G', at map line 1, column 3 and at map line 2, column 3"),
+        (
+            ("S#G", ".#."),
+            "the goal at map line 1, column 3 cannot be reached from the start at map",
+        ),
+        (("S" + "." * 999 + "G",), "keep it within 1000 a side and 100000 cells"),
+        (("S" + "." * 498 + "G",) * 201, "keep it within 1000 a side and 100000 cells"),
+        ("SG", "use Maze.from_text"),
+        ((1, 2), "use Maze.from_text"),
+    ],
+)
+def test_refusals(rows: tuple[str, ...], message: str) -> None:
+    """What is not a maze is refused in one line that names the place and the mend."""
+    with pytest.raises(MazeError, match=re.escape(message)) as caught:
+        Maze(rows)
+    assert "\n" not in str(caught.value)
+
+
+def test_largest_maze() -> None:
+    """A maze at the limit of the size is accepted and solved."""
+    rows = ["." * 1000] * 100
+    maze = Maze(("S" + rows[0][1:], *rows[1:-1], rows[-1][1:] + "G"))
+    assert maze.distances()[maze.start] == 999 + 99
+
+
+def test_from_text_ignores_margins() -> None:
+    """Blank lines around a map and its indentation do not matter; equal maps are equal mazes."""
+    maze = Maze.from_text("\n    ...#G\n    .#...\n    S..#.\n  ")
+    assert maze == Maze(ROWS) == Maze(list(ROWS))  # type: ignore[arg-type]
+    assert hash(maze) == hash(Maze(ROWS))
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_tables_are_read_only(duplicate) -> None:  # type: ignore[no-untyped-def]
+    """Nobody can change the tables of a maze, nor those of its copies."""
+    maze = Maze(ROWS)
+    assert maze.next_state is maze.next_state
+    again = duplicate(maze)
+    assert again == maze
+    for table in (again.next_state, again.free, again.distances(), again.distances(0)):
+        with pytest.raises(ValueError, match="read-only"):
+            table[0] = 0
+
+
+def test_unknown_places() -> None:
+    """States and cells outside of the map are refused, negative ones too."""
+    maze = Maze(ROWS)
+    for state in (-1, 15):
+        with pytest.raises(MazeError, match=r"states are 0\.\.14"):
+            maze.cell(state)
+        with pytest.raises(MazeError, match=r"states are 0\.\.14"):
+            maze.distances(state)
+    for row, column in ((-1, 0), (0, -1), (3, 0), (0, 5)):
+        with pytest.raises(MazeError, match=r"rows are 0\.\.2, columns 0\.\.4"):
+            maze.state(row, column)
+
+
+def test_environment_passes_gymnasiums_check() -> None:
+    """Gymnasium's own checker finds no fault, in any render mode, with the default and own maps."""
+    for mode in (None, "ansi", "rgb_array"):
+        check_env(gymnasium.make("replication/Maze-v0", render_mode=mode).unwrapped)
+    check_env(gymnasium.make("replication/Maze-v0", maze=ROWS).unwrapped)
+
+
+@settings(max_examples=50, deadline=None)
+@given(mazes(), st.lists(st.integers(0, 3), max_size=60))
+def test_environment_follows_the_table(maze: Maze, actions: list[int]) -> None:
+    """An episode visits the states of the table, earns w[s, a] and terminates at the goal only."""
+    weights = np.arange(maze.n_states * 4.0).reshape(-1, 4)
+    env = MazeEnv(maze, weights)
+    state, _ = env.reset()
+    assert state == maze.start
+    for action, due in zip(actions, maze.replay(actions)[1:], strict=True):
+        there, reward, terminated, truncated, _ = env.step(action)
+        assert there == due
+        assert reward == weights[state, action]
+        assert terminated == (there == maze.goal)
+        assert not truncated
+        state = there
+
+
+def test_registered_environment_truncates_after_500_steps() -> None:
+    """The registered environment cuts an episode at the paper's 500 steps, not earlier."""
+    env = gymnasium.make("replication/Maze-v0", maze=Maze(CORRIDOR))
+    env.reset(seed=1)
+    cut = [env.step(0)[3] for _ in range(500)]
+    assert cut == [False] * 499 + [True]
+
+
+def test_environment_refuses_nonsense() -> None:
+    """Wrong weights, render modes, actions and steps before a reset are refused clearly."""
+    with pytest.raises(ValueError, match=r"shape \(2, 4\); this maze needs \(5, 4\)"):
+        MazeEnv(CORRIDOR, np.zeros((2, 4)))
+    with pytest.raises(ValueError, match="finite"):
+        MazeEnv(CORRIDOR, np.full((5, 4), np.nan))
+    with pytest.raises(ValueError, match="unknown render mode 'human'"):
+        MazeEnv(CORRIDOR, render_mode="human")
+    with pytest.raises(MazeError, match="no goal"):
+        MazeEnv(["S.."])
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        MazeEnv(CORRIDOR).step(0)
+    env = MazeEnv(CORRIDOR)
+    env.reset()
+    for action in (4, -1):
+        with pytest.raises(gymnasium.error.InvalidAction):
+            env.step(action)
+
+
+def test_rewards_are_a_copy() -> None:
+    """Changing the caller's weights afterwards does not change the environment's rewards."""
+    weights = np.ones((5, 4))
+    env = MazeEnv(CORRIDOR, weights)
+    weights[:] = 7
+    env.reset()
+    assert env.step(2)[1] == 1.0
+
+
+def test_render() -> None:
+    """The text shows the agent at its cell; the image differs from the empty one there only."""
+    env = MazeEnv(ROWS, render_mode="ansi")
+    assert env.render() == "...#G\n.#...\nS..#.\n"
+    env.reset()
+    env.step(ACTIONS.index("right"))
+    assert env.render() == "...#G\n.#...\nS@.#.\n"
+    env = MazeEnv(ROWS, render_mode="rgb_array")
+    empty = env.render()
+    env.reset()
+    image = env.render()
+    assert image.dtype == np.uint8
+    assert image.shape == (3 * 8, 5 * 8, 3)
+    rows, columns = np.nonzero((image != empty).any(axis=2))
+    assert set(rows // 8) == {2}
+    assert set(columns // 8) == {0}
