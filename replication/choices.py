@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
 import tomllib
 from dataclasses import dataclass
 from functools import cache
@@ -48,7 +47,8 @@ class Choice:
         """The accepted values in words, for error messages and tables."""
         if self.range is not None:
             low, high = self.range
-            return f"a number from {low:g} to {high:g}"
+            kind = "a whole number" if isinstance(self.default, int) else "a number"
+            return f"{kind} from {low} to {high}"
         return ", ".join(repr(value) for value in (self.default, *self.alternatives))
 
     def check(self, value: Any) -> Value:
@@ -61,21 +61,17 @@ class Choice:
         """
         kind = type(self.default)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if kind is str:
-            fits = isinstance(value, str)
-        else:
-            fits = number and math.isfinite(value) and (kind is float or value == int(value))
-        if fits:
-            value = kind(value)
-            if self.range is not None:
-                fits = self.range[0] <= value <= self.range[1]
-            else:
-                fits = value in (self.default, *self.alternatives)
+        fits = isinstance(value, str) if kind is str else number
+        if fits and self.range is not None:
+            low, high = self.range
+            fits = low <= value <= high and (kind is float or value == int(value))
+        elif fits:
+            fits = value in (self.default, *self.alternatives)
         if not fits:
             raise ChoiceError(
                 f"{self.field} = {value!r} is not accepted (choice {self.id}): use {self.accepted}"
             )
-        return value
+        return kind(value)
 
 
 @cache

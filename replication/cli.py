@@ -10,11 +10,14 @@ import json
 import os
 import re
 import shutil
+import signal
 import sys
 import textwrap
 import warnings
+from collections.abc import Sequence
 from enum import StrEnum
 from importlib import metadata
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -108,7 +111,7 @@ def main(
 def run(
     notebooks: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NOTEBOOK]...", help="Names or paths; all by default."),
+        typer.Argument(metavar="NOTEBOOK", help="Names or paths; all by default."),
     ] = None,
     profile: Annotated[Profile, typer.Option(help="How much is run.")] = Profile.PAPER,
     jobs: Annotated[
@@ -125,6 +128,8 @@ def run(
     """Run notebooks and publish their figures, tables and data."""
     from replication.regenerate import RunError, run_notebooks
 
+    # A polite kill ends like Ctrl-C: the kernel and its workers stop, and the stage is removed.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
     default = paths.PROJECT / ("figures" if profile == "paper" else f"build/{profile}")
     target = out or default
@@ -145,10 +150,10 @@ def run(
             typer.echo(error.details if sys.stderr.isatty() else plain, err=True)
         _fail(str(error), 1)
     for table in (path for path in published if path.suffix == ".md"):
-        typer.echo(f"\n{table.read_text(encoding='utf-8').strip()}")
+        typer.echo(f"\n{table.name}\n{table.read_text(encoding='utf-8').strip()}")
     executed = paths.PROJECT / "build" / "executed" / profile
-    typer.echo(f"\n{len(published)} outputs are in {_short(target)}")
-    typer.echo(f"executed notebooks are in {_short(executed)}")
+    typer.echo(f"\noutputs ({len(published)}): {_short(target)}")
+    typer.echo(f"executed notebooks: {_short(executed)}")
 
 
 @app.command(cls=TwoWords)
@@ -157,8 +162,11 @@ def learn(
     method: Annotated[str, typer.Option(help="Name of the method.")] = "unified-incorrect",
     seed: Annotated[int, typer.Option(min=0, help="Root seed.")] = 0,
     incorrect: Annotated[
-        str, typer.Option(metavar="SET", help="Incorrect demos: all, none, or kinds joined by +.")
-    ] = "all",
+        str | None,
+        typer.Option(
+            metavar="SET", help="Incorrect demos: all (the default), none, or kinds joined by +."
+        ),
+    ] = None,
     parameters: Pairs = None,
     out: Annotated[Path, typer.Option(help="Folder for the result.")] = Path("build/learn"),
 ) -> None:
@@ -173,11 +181,13 @@ def learn(
     from replication.irl import get_method
     from replication.params import Params
 
-    get_method(method)
+    uses_incorrect = get_method(method).uses_incorrect
+    if incorrect not in (None, "none") and not uses_incorrect:
+        _fail(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
     params = Params.of(**{"incorrect": "all", **_values(parameters)})
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
-        demos = load_demos(file).select(incorrect)
+        demos = load_demos(file).select(incorrect or "all")
     result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
     saved = result.save(f"{stem}.json")
@@ -192,7 +202,7 @@ def learn(
 
 @demos_app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files to check.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Files to check.")],
 ) -> None:
     """Check demonstration files; exit code 1 if any cannot be used."""
     from replication.demos import DemoError, check_demos
@@ -222,7 +232,7 @@ def schema() -> None:
 
 @app.command()
 def choices(
-    id: Annotated[str | None, typer.Argument(metavar="[ID]", help="Show one whole.")] = None,
+    id: Annotated[str | None, typer.Argument(metavar="ID", help="Show one whole.")] = None,
 ) -> None:
     """List the choices that the paper leaves open, and ours."""
     from replication.choices import register, unknown_name
@@ -235,10 +245,10 @@ def choices(
             (one.id, str(one.default), _accepted(one), one.field or one.data or one.code)
             for one in entries.values()
         ]
-        _print_table(rows, (16, 30, 34), width)
+        _print_table(rows, width)
         return
     if id.upper() not in entries:
-        raise unknown_name(id, list(entries), "choice")
+        raise unknown_name(id.upper(), list(entries), "choice")
     one = entries[id.upper()]
     lines = {
         "id": one.id,
@@ -263,17 +273,14 @@ def _accepted(one: Any) -> str:
     return ", ".join(map(str, one.alternatives))
 
 
-def _print_table(rows: list[tuple[str, ...]], widths: tuple[int, ...], width: int) -> None:
-    """Print rows in columns; a cell that is too long goes on in the next line."""
-    last = max(20, width - sum(widths) - 2 * len(widths))
+def _print_table(rows: Sequence[tuple[str, ...]], width: int) -> None:
+    """Print rows in columns; the first is never broken, the others share what is left."""
+    first = max(len(row[0]) for row in rows)
+    share = max(12, (width - first) // (len(rows[0]) - 1) - 2)
     for row in rows:
-        cells = [
-            textwrap.wrap(cell, size) or [""]
-            for cell, size in zip(row, (*widths, last), strict=True)
-        ]
-        for line in range(max(map(len, cells))):
-            parts = [cell[line] if line < len(cell) else "" for cell in cells]
-            padded = [f"{part:<{size}}" for part, size in zip(parts, (*widths, 0), strict=True)]
+        cells = [[row[0]], *(textwrap.wrap(cell, share) for cell in row[1:])]
+        for parts in zip_longest(*cells, fillvalue=""):
+            padded = [f"{part:<{share if at else first}}" for at, part in enumerate(parts)]
             typer.echo("  ".join(padded).rstrip())
 
 
@@ -281,7 +288,8 @@ def _notebook(name: str) -> Path:
     """Find a notebook by its name or path."""
     path = Path(name)
     if path.suffix == ".ipynb" or len(path.parts) > 1:
-        return paths.resolve(path)
+        found = paths.resolve(path)
+        return found if found.exists() else _fail(f"there is no notebook {name}")
     known = [one.stem for one in _all_notebooks()]
     if name not in known:
         from replication.choices import unknown_name
@@ -315,7 +323,7 @@ def _no_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not JSON")
 
 
-def _show_warning(message: Warning | str, *_: Any) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     typer.echo(f"warning: {message}", err=True)
 
 

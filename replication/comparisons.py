@@ -15,8 +15,8 @@ from replication.setting import Setting
 F_INDICES = ("printed", "updated")
 """Both readings of Eq. 9 (choice F-INDEX), reported side by side everywhere."""
 
-F_LABELS = {"": "–", "printed": "F_i (printed)", "updated": "F_i+1 (updated)"}
-"""How an F index reads in tables; a method without a trace has none."""
+F_LABELS = {"": "–", "printed": "Fᵢ (printed)", "updated": "Fᵢ₊₁ (updated)"}
+"""How an F index reads in tables and figures; a method without a trace has none."""
 
 SETS = (
     "none",

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -34,6 +33,9 @@ from replication.envs.maze import Maze
 from replication.params import Expert
 
 OPPOSITE = (1, 0, 3, 2)  # of up, down, right, left
+
+Node = tuple[int, int, int]
+"""A state, the action that led there, and how often it was taken in a row."""
 
 
 def demonstrate(
@@ -57,29 +59,33 @@ def correct_actions(maze: Maze, *, leg: int) -> list[int]:
     Nearest means the smallest sum of squared differences over the legs; among equals the action
     that comes first in the paper's order is taken first.
     """
-    distances = maze.distances()
+    distances, next_state = maze.distances().tolist(), maze.next_state.tolist()
 
-    @cache
-    def best(state: int, last: int, run: int) -> tuple[float, int]:
-        """Cost of the legs that are not finished yet, and the action to take."""
-        if state == maze.goal:
-            return float((run - leg) ** 2), -1
-        options = []
-        for action in range(maze.n_actions):
-            there = int(maze.next_state[state, action])
-            if distances[there] == distances[state] - 1:
-                turned = last not in (-1, action)
-                ahead, _ = best(there, action, 1 if turned or last == -1 else run + 1)
-                options.append((ahead + ((run - leg) ** 2 if turned else 0), action))
-        return min(options)
+    def options(here: Node) -> list[Node]:
+        state, last, run = here
+        return [
+            (there, action, run + 1 if action == last else 1)
+            for action, there in enumerate(next_state[state])
+            if distances[there] == distances[state] - 1
+        ]
 
-    actions: list[int] = []
-    state, last, run = maze.start, -1, 0
-    while state != maze.goal:
-        action = best(state, last, run)[1]
-        run = run + 1 if action == last else 1
-        state, last = int(maze.next_state[state, action]), action
-        actions.append(action)
+    layers: list[set[Node]] = [{(maze.start, -1, 0)}]
+    for _ in range(distances[maze.start]):
+        layers.append({there for here in layers[-1] for there in options(here)})
+    cost = {(goal, last, run): (run - leg) ** 2 for goal, last, run in layers[-1]}
+    following: dict[Node, Node] = {}
+    for here in (node for layer in reversed(layers[:-1]) for node in layer):
+        _, last, run = here
+        costs = {}
+        for there in options(here):
+            turned = last not in (-1, there[1])
+            costs[there] = cost[there] + ((run - leg) ** 2 if turned else 0)
+        following[here] = min(costs, key=lambda there: (costs[there], there[1]))
+        cost[here] = costs[following[here]]
+    here, actions = (maze.start, -1, 0), []
+    while here in following:
+        here = following[here]
+        actions.append(here[1])
     return actions
 
 
@@ -164,17 +170,18 @@ def _beside(point: tuple[int, int], action: int) -> tuple[int, int]:
 def _fewest_turns(maze: Maze, source: int, target: int, *, avoid: set[int]) -> list[int] | None:
     """Return the shortest way with the fewest turns that keeps off `avoid`, or None."""
     best: dict[tuple[int, int], tuple[int, int, list[int]]] = {}
-    queue: deque[tuple[int, int, list[int]]] = deque([(source, -1, [])])
+    queue: deque[tuple[int, int, int, list[int]]] = deque([(source, -1, 0, [])])
     while queue:
-        state, last, actions = queue.popleft()
-        turns = sum(a != b for a, b in pairwise(actions))
+        state, last, turns, actions = queue.popleft()
         known = best.get((state, last))
-        if known is not None and (known[0], known[1]) <= (len(actions), turns):
+        if known is not None and known[:2] <= (len(actions), turns):
             continue
         best[state, last] = (len(actions), turns, actions)
-        for action in range(maze.n_actions):
-            there = int(maze.next_state[state, action])
-            if there != state and there not in avoid and state != target:
-                queue.append((there, action, [*actions, action]))
+        if state == target:
+            continue
+        for action, there in enumerate(maze.next_state[state].tolist()):
+            if there != state and there not in avoid:
+                turned = last not in (-1, action)
+                queue.append((there, action, turns + turned, [*actions, action]))
     reached = [found for (state, _), found in best.items() if state == target]
     return min(reached)[2] if reached else None

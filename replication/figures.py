@@ -9,9 +9,10 @@ from __future__ import annotations
 import functools
 import io
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from replication.demos import Demo, Demos
@@ -29,7 +31,6 @@ from replication.files import write_file
 from replication.fit import Fit
 
 P = ParamSpec("P")
-R = TypeVar("R")
 
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -61,13 +62,21 @@ WIDTH = 7.0
 """Inches: both columns of a page."""
 
 
-def _styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Let a function draw in our style, whatever the caller's settings are."""
+def _style() -> AbstractContextManager[None]:
+    """Draw in our style, whatever the caller's settings are."""
+    return mpl.rc_context(mpl.rcParamsDefault | STYLE)
+
+
+def _settled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Draw in our style and settle the layout, else each save would go on from the one before."""
 
     @functools.wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-        with mpl.rc_context(mpl.rcParamsDefault | STYLE):
-            return draw(*args, **kwargs)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with _style():
+            figure = draw(*args, **kwargs)
+            figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        return figure
 
     return wrapper
 
@@ -105,21 +114,21 @@ class Counts:
     published: float | None = None
 
 
-@_styled
 def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "svg")) -> list[Path]:
     """Write a figure as `path` with each of the suffixes; returns the files."""
     metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
     written = []
     for suffix in formats:
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=suffix, metadata=metadata[suffix])
+        with _style():
+            figure.savefig(buffer, format=suffix, metadata=metadata[suffix])
         written.append(write_file(path.with_suffix(f".{suffix}"), buffer.getvalue()))
     return written
 
 
-@_styled
+@_settled
 def maze_figure(demos: Demos) -> Figure:
-    """Draw the map with the correct demonstration, and again with incorrect ones (Figs. 4 and 8)."""
+    """Draw the map with correct demonstrations, and with incorrect ones too (Figs. 4 and 8)."""
     figure, axes = _figure(1, 2, height=4.0)
     for panel, title in zip(axes, ("(a) correct", "(b) correct and incorrect"), strict=True):
         _draw_map(panel, demos.environment)
@@ -141,14 +150,14 @@ def maze_figure(demos: Demos) -> Figure:
     return figure
 
 
-@_styled
+@_settled
 def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
     """Draw the error against the iteration (Figs. 5 and 9), one panel for each title.
 
     The line is one trial, declared before the run; the band holds the middle half of all trials.
     Triangles on the axis mark where the paper's own curves reach zero.
     """
-    figure, axes = _figure(1, len(panels), height=3.0, sharey=True)
+    figure, axes = _figure(1, len(panels), height=3.0, sharex=True, sharey=True)
     for panel, (title, curves) in zip(axes, panels.items(), strict=True):
         for one in curves:
             iterations = np.arange(one.errors.shape[1])
@@ -156,7 +165,10 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
             panel.fill_between(iterations, low, high, color=one.colour, alpha=0.18, lw=0)
             traced = one.errors[one.traced]
             end = int(np.argmax(traced <= 0)) if (traced <= 0).any() else len(traced) - 1
-            panel.plot(iterations[: end + 1], traced[: end + 1], color=one.colour, lw=1.1)
+            dashes = "-" if one is curves[0] else (0, (4, 1.5))  # equal curves stay visible
+            panel.plot(
+                iterations[: end + 1], traced[: end + 1], color=one.colour, lw=1.1, ls=dashes
+            )
             panel.plot(end, traced[end], "o", color=one.colour, ms=4, clip_on=False, zorder=4)
             if one.published is not None:
                 panel.plot(
@@ -186,7 +198,7 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
     return figure
 
 
-@_styled
+@_settled
 def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     """Draw the iterations of every trial (Figs. 6 and 9), one row for each title.
 
@@ -197,7 +209,8 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     )
     for (left, right), (title, counts) in zip(np.atleast_2d(grid), panels.items(), strict=True):
         for position, one in enumerate(counts):
-            left.plot(one.iterations, color=one.colour, lw=0.9)
+            dashes = "-" if one is counts[0] else (0, (4, 1.5))
+            left.plot(one.iterations, color=one.colour, lw=0.9, ls=dashes)
             _draw_distribution(right, position, one)
         left.set_title(title, loc="left")
         left.set(ylabel="iterations", xlim=(-1, len(counts[0].iterations)), ylim=(0, None))
@@ -216,7 +229,7 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     return figure
 
 
-@_styled
+@_settled
 def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> Figure:
     """Draw values of all states as surfaces over the maze (Fig. 7).
 
@@ -227,74 +240,75 @@ def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> 
     surfaces
         Values [state] by the panel's title.
     """
-    figure = Figure(figsize=(WIDTH, 2.9))
+    figure = Figure(figsize=(WIDTH, 2.5))
     FigureCanvasAgg(figure)
-    columns, rows = np.meshgrid(np.arange(maze.shape[1]), np.arange(maze.shape[0])[::-1])
+    n_rows, n_columns = maze.shape
+    x, y = np.meshgrid(np.arange(n_columns), np.arange(n_rows)[::-1])
+    share = 1 / len(surfaces)
     for position, (title, values) in enumerate(surfaces.items()):
         panel: Any = figure.add_axes(
-            (position / len(surfaces) - 0.005, 0.06, 1 / len(surfaces) - 0.03, 0.84),
-            projection="3d",
+            (position * share + 0.015, 0.04, share - 0.03, 0.88), projection="3d"
         )
         height = np.where(maze.free, values, np.nan).reshape(maze.shape)
-        panel.plot_surface(
-            columns, rows, height, cmap="viridis", rstride=1, cstride=1, lw=0.1, ec="0.35"
-        )
-        panel.set_title(title, y=0.98)
-        panel.set_xlabel("x", labelpad=-10)
-        panel.set_ylabel("y", labelpad=-10)
+        panel.plot_surface(x, y, height, cmap="viridis", rstride=1, cstride=1, lw=0.1, ec="0.35")
+        panel.set_title(title, y=0.99)
+        panel.set_xlabel("x (cells)", labelpad=-8)
+        panel.set_ylabel("y (cells)", labelpad=-8)
         panel.tick_params(labelsize=6.5, pad=-3)
-        panel.set_xticks([0, 5, 10, 15, 19])
-        panel.set_yticks([0, 5, 10, 15, 19])
+        panel.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+        panel.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+        panel.zaxis.set_major_locator(MaxNLocator(4))
+        panel.set_box_aspect((1, 1, 0.75), zoom=1.0)
         panel.view_init(elev=28, azim=-125)
     return figure
 
 
-@_styled
-def sets_figure(table: pd.DataFrame) -> Figure:
-    """Draw what each set of incorrect demonstrations saves, from :func:`tables.sets_table`."""
-    shown = table[table["verdict"] != ""]
-    labels = list(dict.fromkeys(shown["set"]))
-    readings = list(dict.fromkeys(shown["F"]))
-    figure, axes = _figure(1, len(readings), height=0.9 + 0.28 * len(labels), sharey=True)
-    for panel, reading in zip(axes, readings, strict=True):
-        part = shown[shown["F"] == reading].set_index("set").loc[labels]
-        saves, y = -part["difference"], np.arange(len(labels))
-        spans = np.array([saves + part["high"], -part["low"] - saves])
-        panel.errorbar(
-            saves,
-            y,
-            xerr=spans,
-            fmt="o",
-            ms=4.5,
-            color=COLOURS["unified-incorrect"],
-            elinewidth=1.2,
-        )
+@_settled
+def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
+    """Draw what each set of incorrect demonstrations saves, a panel for each reading of Eq. 9.
+
+    Parameters
+    ----------
+    panels
+        By title: a table with `set`, `leaving`, and `saved` with its interval `low` to `high`.
+    """
+    rows = len(next(iter(panels.values())))
+    figure, axes = _figure(1, len(panels), height=1.1 + 0.26 * rows, sharex=True, sharey=True)
+    for panel, (title, table) in zip(axes, panels.items(), strict=True):
+        y = np.arange(len(table))
         panel.axvline(0, color="0.5", lw=0.8)
-        panel.set(title=reading, xlabel="iterations saved", yticks=y)
+        panel.hlines(y, table["low"], table["high"], color=COLOURS["unified-incorrect"], lw=1.4)
+        panel.plot(table["saved"], y, "o", ms=4.5, color=COLOURS["unified-incorrect"])
+        panel.set(title=title, xlabel="iterations saved", yticks=y)
         panel.set_yticklabels(
-            f"{label}  ({n} leave)" for label, n in zip(labels, part["leaving"], strict=True)
+            f"{row.set}  ({row.leaving})" for row in table.itertuples(index=False)
         )
     axes[0].invert_yaxis()
+    axes[0].set_ylabel("set (leaving pairs)")
     return figure
 
 
-@_styled
+@_settled
 def fit_figure(fit: Fit) -> Figure:
     """Draw a fit: the map with demonstrations and the learned path, the reward, and the errors."""
     maze = fit.demos.environment
-    figure, axes = _figure(1, 3, height=3.0, width_ratios=(1, 1, 1))
+    figure, axes = _figure(1, 3, height=3.0)
     _draw_map(axes[0], maze)
     for demo in fit.demos.correct:
         _draw_arrows(axes[0], maze, demo)
     x, y = _places(maze, fit.states)
-    axes[0].plot(x, y, color=COLOURS["unified"], lw=3, alpha=0.4, solid_capstyle="round")
-    axes[0].set_title("correct demo (red), learned path (blue)")
+    axes[0].plot(x, y, color=COLOURS["unified"], lw=4, alpha=0.45, solid_capstyle="round")
+    axes[0].set_title("learned path")
     value = np.where(maze.free, fit.weights.max(axis=1), np.nan).reshape(maze.shape)
     image = axes[1].imshow(value[::-1], cmap="viridis", origin="lower")
-    axes[1].set(title="reward weight, best action", xticks=[], yticks=[])
+    axes[1].set(title="largest reward weight", xticks=[], yticks=[])
     figure.colorbar(image, ax=axes[1], fraction=0.046)
     axes[2].plot(fit.errors, color=COLOURS["unified"])
     axes[2].set(title="error d", xlabel="iteration", xlim=(0, None), ylim=(0, None))
+    axes[2].set_box_aspect(1)
+    demo_handle = Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct demo")
+    path_handle = Line2D([], [], color=COLOURS["unified"], lw=4, alpha=0.45, label="learned path")
+    _legend_below(figure, [demo_handle, path_handle])
     return figure
 
 

@@ -42,7 +42,7 @@ class Outputs:
         """
         write_csv(numbers, self.folder / f"{name}.csv")
         png, _ = save_figure(figure, self.folder / name, ("png", "svg"))
-        return Image(data=png.read_bytes(), format="png", width=700, alt=alt)
+        return Image(data=png.read_bytes(), width=700, alt=alt)
 
     def table(self, table: pd.DataFrame, name: str, *, readable: pd.DataFrame) -> Markdown:
         """Write a table in full as CSV and for reading as Markdown; return the latter."""

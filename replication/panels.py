@@ -78,13 +78,33 @@ def surfaces(trial: Trial, report: Report) -> dict[str, NDArray[np.float64]]:
         What stands for a state's actions (FIG7-SURFACE), and when mid-term is (FIG7-MIDTERM).
     """
     assert trial.snapshots is not None, "surfaces need a trial that kept its snapshots"
-    reduce = {"max": np.max, "mean": np.mean}[report.surface]
+    reduce = np.max if report.surface == "max" else np.mean
     middle = round(report.mid_term * trial.iterations)
     return {
         f"(a) Q after {middle} iterations": reduce(trial.snapshots.q[middle], axis=1),
         f"(b) Q at the end ({trial.iterations})": reduce(trial.q, axis=1),
         "(c) reward at the end": reduce(trial.weights, axis=1),
     }
+
+
+def set_panels(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return what each set of incorrect demonstrations saves, a panel for each reading of Eq. 9.
+
+    `table` is that of :func:`replication.tables.sets_table`, whose differences are negative where
+    iterations are saved.
+    """
+    shown = table[table["verdict"] != ""]
+    saved = pd.DataFrame(
+        {
+            "F": shown["F"],
+            "set": shown["set"],
+            "leaving": shown["leaving"],
+            "saved": 0 - shown["difference"],
+            "low": 0 - shown["high"],
+            "high": 0 - shown["low"],
+        }
+    )
+    return {F_LABELS[f]: part for f, part in saved.groupby("F", sort=False)}
 
 
 def demo_numbers(demos: Demos) -> pd.DataFrame:
@@ -176,12 +196,12 @@ def describe_surfaces(values: Mapping[str, NDArray[np.float64]]) -> str:
     return f"Surfaces over the maze. {'; '.join(parts)}."
 
 
-def describe_sets(table: pd.DataFrame) -> str:
-    """Return the figure of :func:`replication.tables.sets_table` in words."""
+def describe_sets(panels: Mapping[str, pd.DataFrame]) -> str:
+    """Return what sets of incorrect demonstrations save, in words."""
     parts = [
-        f"{row.set}, {row.F}: {-row.difference:.1f} ({-row.high:.1f} to {-row.low:.1f})"
+        f"{row.set}, {title}: {row.saved:.1f} ({row.low:.1f} to {row.high:.1f})"
+        for title, table in panels.items()
         for row in table.itertuples()
-        if row.verdict
     ]
     return f"Iterations saved by incorrect demonstrations, with 95 % intervals. {'; '.join(parts)}."
 

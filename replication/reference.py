@@ -90,7 +90,8 @@ def roll_out(
 
     Returns the T + 1 states, the T actions and the stream after T draws.
     """
-    stream, states, actions = stream[:], [start], []
+    stream, states = stream[:], [start]
+    actions: list[int] = []
     while len(actions) < horizon:
         actions.append(choose(q[states[-1]], draw(stream), 0.0, random_ties))
         states.append(next_state[states[-1]][actions[-1]])
@@ -109,7 +110,8 @@ def choose(row: list[float], word: int, epsilon: float, random_ties: bool) -> in
     if high < round(epsilon * HALF):
         candidates = list(range(len(row)))
     else:
-        candidates = [action for action, value in enumerate(row) if value == max(row)]
+        best = max(row)
+        candidates = [action for action, value in enumerate(row) if value == best]
         if not random_ties:
             candidates = candidates[:1]
     return candidates[low * len(candidates) // HALF]

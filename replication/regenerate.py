@@ -20,6 +20,7 @@ from __future__ import annotations
 import ast
 import copy
 import json
+import logging
 import math
 import os
 import re
@@ -51,6 +52,9 @@ STARTS = 3
 """Attempts at starting a kernel: now and then another program takes its port."""
 
 KERNEL = "replication"
+
+# What papermill logs of a failure is said again, and better, by the error that is raised.
+logging.getLogger("papermill").addHandler(logging.NullHandler())
 
 
 class NotebookError(ValueError):
@@ -307,6 +311,9 @@ def run_notebooks(
         if seed is not None:
             values["seed"] = seed
         notebook.check(values)
+        for target in (out / name for name in notebook.outputs):
+            if target.is_dir():
+                _fail(target, f"is a folder, but {notebook.name} writes a file of that name")
         runs.append((notebook, values))
     _check_apart([notebook for notebook, _ in runs])
 
@@ -338,7 +345,8 @@ def run_notebooks(
             _check_outputs(notebook, stage, stamps)
             published += _publish(notebook, stage, out)
         seconds = time.perf_counter() - began
-        echo(f"{notebook.name}: {len(notebook.outputs)} outputs in {seconds:.1f} s")
+        number = "1 output" if len(notebook.outputs) == 1 else f"{len(notebook.outputs)} outputs"
+        echo(f"{notebook.name}: {number} in {seconds:.1f} s")
     return published
 
 
@@ -361,7 +369,11 @@ def _check_apart(notebooks: Sequence[Notebook]) -> None:
 def _private_kernel(scratch: Path, *, progress: bool) -> Iterator[None]:
     """Make the running interpreter the kernel, free of the user's own start-up files."""
     spec = {
-        "argv": [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"],
+        # its own warnings (that local sockets are not encrypted) are no concern of the user
+        "argv": [
+            *(sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"),
+            "--log-level=ERROR",
+        ],
         "display_name": KERNEL,
         "language": "python",
         "env": {
@@ -395,14 +407,13 @@ def _execute(
 ) -> None:
     """Execute into the file `draft`, which is there after a failure too."""
     begun: list[int] = []
-    where = notebook.path
 
     def begin(cell: Any, cell_index: int) -> None:
         begun.append(cell_index)
 
-    def number() -> int:
+    def place(at: int) -> str:
         # papermill puts its own cell behind the parameters cell
-        return begun[-1] + 1 - (begun[-1] > notebook.at)
+        return f"{notebook.path}: cell {at + 1 - (at > notebook.at)}"
 
     for attempt in range(1, STARTS + 1):
         try:
@@ -423,24 +434,22 @@ def _execute(
         except PapermillExecutionError as error:
             said = f"{error.ename}: {_first_line(error.evalue)}"
             details = "\n".join(error.traceback)
-            raise RunError(f"{where}: cell {number()} failed: {said}", details) from None
+            raise RunError(f"{place(error.cell_index)} failed: {said}", details) from None
         except Exception as error:
             if not begun:
                 if attempt < STARTS:
                     continue
-                raise RunError(
-                    f"{where}: the kernel does not start: {_first_line(error)}"
-                ) from error
+                said = f"the kernel does not start: {_first_line(error)}"
+                raise RunError(f"{notebook.path}: {said}") from error
             if isinstance(error, DeadKernelError):
                 why = "the kernel was killed, perhaps for want of memory; use fewer --jobs"
-                raise RunError(f"{where}: cell {number()}: {why}") from None
+                raise RunError(f"{place(begun[-1])}: {why}") from None
             if isinstance(error, CellTimeoutError):
                 why = f"took more than {timeout} seconds; allow more with --timeout"
-                raise RunError(f"{where}: cell {number()} {why}") from None
-            raise RunError(f"{where}: cell {number()}: {_first_line(error)}") from error
-        code = [i for i, cell in enumerate(node.cells) if cell.cell_type == "code" and cell.source]
-        if begun[-1] != code[-1]:
-            raise RunError(f"{where}: cell {number()} ended the notebook before its last cell")
+                raise RunError(f"{place(begun[-1])} {why}") from None
+            raise RunError(f"{place(begun[-1])}: {_first_line(error)}") from error
+        if node.cells[begun[-1]].metadata.papermill.exception:  # SystemExit, no error to papermill
+            raise RunError(f"{place(begun[-1])} ended the notebook before its last cell")
         return
 
 
@@ -453,7 +462,6 @@ def _copy_merged(notebook: Notebook, out: Path, stage: Path) -> dict[str, int]:
     for name in notebook.merged:
         if (out / name).exists():
             shutil.copyfile(out / name, stage / name)
-            os.utime(stage / name, (0, 0))  # so that any later writing shows
             stamps[name] = (stage / name).stat().st_mtime_ns
     return stamps
 
@@ -499,8 +507,8 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, out: Path) -> str:
             cell.id = f"papermill-{at}"
         if cell.cell_type == "code":
             cell.outputs = _without_bars(cell.outputs)
-    text = nbformat.writes(node)
-    return str(text).replace(json.dumps(str(stage))[1:-1], json.dumps(str(out))[1:-1]) + "\n"
+    text = str(nbformat.writes(node))
+    return text.replace(json.dumps(str(stage))[1:-1], json.dumps(str(out))[1:-1]) + "\n"
 
 
 def _without_bars(outputs: Sequence[Any]) -> list[Any]:

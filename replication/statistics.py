@@ -102,15 +102,19 @@ def compare(
     low, high = mean_interval(a - b)
     equal = bool((a == b).all())
     flat = a.std() == 0 or b.std() == 0
+    moments = [moment for s in (a, b) for moment in (s.mean(), s.std(ddof=1), len(s))]
+    with np.errstate(divide="ignore", invalid="ignore"):  # samples that do not spread
+        welch = stats.ttest_ind_from_stats(*moments, equal_var=False).pvalue
+        spread = stats.levene(a, b, center="median").pvalue
     return Comparison(
         difference=float((a - b).mean()),
         low=low,
         high=high,
         fewer=float((a[:, None] < b).mean() + 0.5 * (a[:, None] == b).mean()),
-        p_welch=1.0 if equal else float(stats.ttest_ind(a, b, equal_var=False).pvalue),
+        p_welch=1.0 if equal else float(welch),
         p_wilcoxon=1.0 if equal else float(stats.wilcoxon(a, b).pvalue),
         sd_ratio=np.nan if flat else float(a.std(ddof=1) / b.std(ddof=1)),
-        p_spread=np.nan if flat else float(stats.levene(a, b, center="median").pvalue),
+        p_spread=np.nan if flat else float(spread),
         power=power(a - b, published),
     )
 
@@ -136,8 +140,9 @@ def power(differences: NDArray[np.float64], effect: float) -> float:
     if not np.isfinite(effect) or sd == 0:
         return float("nan")
     critical = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)
-    shift = abs(effect) / sd * np.sqrt(n)
-    return float(stats.nct.sf(critical, n - 1, shift) + stats.nct.cdf(-critical, n - 1, shift))
+    shift = effect / sd * np.sqrt(n)
+    # The square of a non-central t is a non-central F, which SciPy computes without NaN far out.
+    return float(stats.ncf.sf(critical**2, 1, n - 1, shift**2))
 
 
 def verdict_fewer(comparison: Comparison) -> str:

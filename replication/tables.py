@@ -67,7 +67,7 @@ def summary_table(
     for (method, f), setting in settings.items():
         own = rows_of(trials, setting)
         ours = summarise(own["iterations"], own["converged"])
-        row = {"method": get_method(method).label, "F": F_LABELS[f], **asdict(ours)}
+        row = {"method": get_method(method).label, "F": f, **asdict(ours)}
         if method in published:
             paper = published[method]
             low, high = prediction_interval(paper.mean, paper.sd, paper.n, ours.n)
@@ -104,7 +104,7 @@ def claims_table(
                 {
                     "claim": claim.text,
                     "place": claim.place or "ours",
-                    "F": F_LABELS[f],
+                    "F": f,
                     "judged": claim.judged,
                     **asdict(found),
                     "paper_difference": effect,
@@ -131,7 +131,7 @@ def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.Data
         rows.append(
             {
                 "set": kinds,
-                "F": F_LABELS[f],
+                "F": f,
                 "demonstrations": len(setting.selected.incorrect),
                 **pairs_near(setting.selected),
                 "mean": ours.mean,
@@ -172,11 +172,12 @@ def pairs_near(demos: Demos) -> dict[str, int]:
 
 def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
     """Return a summary table as a reader wants it: mean (SD) beside the paper's."""
-    readable = table[["method", "F"]].rename(columns={"method": "Method"})
+    readable = table[["method"]].rename(columns={"method": "Method"})
+    readable["F"] = table["F"].map(F_LABELS)
     readable["Mean [95 %]"] = [
         _interval(*row) for row in zip(table["mean"], table["low"], table["high"], strict=True)
     ]
-    readable["SD"] = table["sd"].map("{:.2f}".format)
+    readable["SD"] = table["sd"].map(_number)
     readable["Median (quartiles)"] = [
         f"{m:g} ({a:g}–{b:g})"
         for m, a, b in zip(table["median"], table["quartile_1"], table["quartile_3"], strict=True)
@@ -198,21 +199,20 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
 
 def readable_claims(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table of claims as a reader wants it."""
-    readable = table[["claim", "place", "F"]].rename(columns={"claim": "Claim", "place": "Place"})
+    readable = table[["claim", "place"]].rename(columns={"claim": "Claim", "place": "Place"})
+    readable["F"] = table["F"].map(F_LABELS)
     readable["Difference [95 %]"] = [
         _interval(*row)
         for row in zip(table["difference"], table["low"], table["high"], strict=True)
     ]
-    readable["Paper"] = [
-        "–" if np.isnan(effect) else f"{effect:.2f}" for effect in table["paper_difference"]
-    ]
-    readable["P(fewer)"] = table["fewer"].map("{:.2f}".format)
-    readable["SD ratio"] = table["sd_ratio"].map("{:.2f}".format)
+    readable["Paper"] = table["paper_difference"].map(_number)
+    readable["P(fewer)"] = table["fewer"].map(_number)
+    readable["SD ratio"] = table["sd_ratio"].map(_number)
     readable["p (Holm)"] = [
         f"{p} ({h})" for p, h in zip(table["p"].map(_p), table["p_holm"].map(_p), strict=True)
     ]
     readable["Power"] = [
-        "–" if np.isnan(power) or judged == "steadier" else f"{power:.2f}"
+        "–" if judged == "steadier" else _number(power)
         for power, judged in zip(table["power"], table["judged"], strict=True)
     ]
     readable["Verdict"] = table["verdict"]
@@ -223,12 +223,14 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table of sets as a reader wants it, both readings of Eq. 9 in one row."""
     keys = ["set", "demonstrations", "pairs", "leaving", "beside"]
     readable = table[keys].drop_duplicates().reset_index(drop=True)
-    for label, part in table.groupby("F", sort=False):
+    for f, part in table.groupby("F", sort=False):
+        label = F_LABELS[f]
         readable[f"{label}: mean (SD)"] = [
-            f"{mean:.2f} ({sd:.2f})" for mean, sd in zip(part["mean"], part["sd"], strict=True)
+            f"{_number(mean)} ({_number(sd)})"
+            for mean, sd in zip(part["mean"], part["sd"], strict=True)
         ]
         readable[f"{label}: saves"] = [
-            "–" if not verdict else _interval(-difference, -high, -low)
+            "–" if not verdict else _interval(0 - difference, 0 - high, 0 - low)
             for verdict, difference, low, high in zip(
                 part["verdict"], part["difference"], part["low"], part["high"], strict=True
             )
@@ -240,12 +242,12 @@ def findings(table: pd.DataFrame) -> str:
     """Return a table of claims in words, as a Markdown list."""
     lines = []
     for row in table.itertuples():
-        numbers = f"{row.sd_ratio:.2f} times the SD"
+        numbers = f"{_number(row.sd_ratio)} times the SD"
         if row.judged == "fewer":
             numbers = f"difference {_interval(row.difference, row.low, row.high)}"
             if not np.isnan(row.paper_difference):
                 numbers += f", in the paper {row.paper_difference:.2f}"
-        lines.append(f"- **{row.verdict}** with {row.F}: {row.claim} ({numbers}).\n")
+        lines.append(f"- **{row.verdict}** with {F_LABELS[row.F]}: {row.claim} ({numbers}).\n")
     return "".join(lines)
 
 
@@ -273,6 +275,10 @@ def write_trials(trials: pd.DataFrame, path: Path) -> Path:
 
 def _interval(middle: float, low: float, high: float) -> str:
     return "–" if np.isnan(middle) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _number(x: float) -> str:
+    return "–" if np.isnan(x) else f"{x:.2f}"
 
 
 def _p(p: float) -> str:

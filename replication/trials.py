@@ -48,12 +48,10 @@ class Results:
         return self._store.get(trial_key(setting, self._root, k), snapshots=snapshots)
 
     def errors(self, setting: Setting) -> NDArray[np.float64]:
-        """Return d of every trial, `[trial, iteration]`, zero after a trial has converged."""
+        """Return d of every trial, `[trial, iteration]`; after its end a trial keeps its last d."""
         curves = [self.trial(setting, k).errors for k in range(self.trials)]
-        table = np.zeros((len(curves), max(map(len, curves))))
-        for row, curve in zip(table, curves, strict=True):
-            row[: len(curve)] = curve
-        return table
+        longest = max(map(len, curves))
+        return np.array([np.pad(d, (0, longest - len(d)), mode="edge") for d in curves])
 
     def iterations(self, setting: Setting) -> NDArray[np.int64]:
         """Return the number of iterations of every trial, `[trial]`."""

@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import pydoc
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from replication import choices, params
+from replication.choices import Choice, ChoiceError, Chosen, register, unknown_name
+from replication.paths import PROJECT
+
+ENTRIES = list(register().values())
+IDS = [one.id for one in ENTRIES]
+CLASSES = [
+    kind
+    for _, kind in inspect.getmembers(params, inspect.isclass)
+    if issubclass(kind, Chosen) and kind is not Chosen
+]
+
+WHOLE = Choice("N", "p", "o", 5, "r", range=(1, 9), field="Some.n")
+REAL = Choice("X", "p", "o", 0.5, "r", range=(0.0, 1.0), field="Some.x")
+WORD = Choice("WORD", "p", "o", "new", "r", alternatives=("kept", "reset"), field="Some.word")
+STEP = Choice("STEP", "p", "o", 4, "r", alternatives=(1, 2), field="Some.step")
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=IDS)
+def test_entry_is_whole(entry: Choice) -> None:
+    """Each entry says where, what, why and which, and has its place in one kind of locus."""
+    assert all([entry.id, entry.place, entry.open, entry.rule, entry.default != ""])
+    assert [bool(locus) for locus in (entry.field, entry.data, entry.code)].count(True) == 1
+    assert entry.id == entry.id.upper()
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=IDS)
+def test_values_are_distinct_and_of_one_type(entry: Choice) -> None:
+    """A parameter has alternatives or a range around its default; any other choice has neither."""
+    values = (entry.default, *entry.alternatives)
+    assert len(set(values)) == len(values)
+    assert {type(value) for value in values} == {type(entry.default)}
+    assert (bool(entry.alternatives) + (entry.range is not None)) == bool(entry.field)
+    if entry.range is not None:
+        assert isinstance(entry.default, int | float)
+        assert entry.range[0] <= entry.default <= entry.range[1]
+
+
+def test_fields_and_entries_match() -> None:
+    """Each field of a parameter dataclass is one entry's field, and the other way round."""
+    declared = {
+        f"{kind.__name__}.{field.name}": field.metadata.get("choice")
+        for kind in CLASSES
+        for field in dataclasses.fields(kind)  # type: ignore[arg-type] # they are dataclasses
+    }
+    assert declared == {entry.field: entry.id for entry in ENTRIES if entry.field}
+
+
+def test_every_parameter_dataclass_is_checked() -> None:
+    """No dataclass of the module has fields that the register does not see."""
+    kinds = {kind for _, kind in inspect.getmembers(params, dataclasses.is_dataclass)}
+    assert kinds == {*CLASSES, params.Params}
+
+
+@pytest.mark.parametrize("entry", [e for e in ENTRIES if e.data], ids=lambda e: e.id)
+def test_data_files_exist(entry: Choice) -> None:
+    """A choice that a data file embodies names a file of the project."""
+    assert (PROJECT / entry.data).is_file()
+
+
+@pytest.mark.parametrize("entry", [e for e in ENTRIES if e.code], ids=lambda e: e.id)
+def test_code_exists(entry: Choice) -> None:
+    """A choice that code embodies names an object of a module of the package."""
+    module = entry.code.rpartition(".")[0]
+    importlib.import_module(module)
+    assert module.startswith("replication.")
+    assert pydoc.locate(entry.code) is not None
+
+
+@pytest.mark.parametrize("entry", [e for e in ENTRIES if e.field], ids=lambda e: e.id)
+def test_defaults_pass_their_own_check(entry: Choice) -> None:
+    """A default is accepted and named among the accepted values, unless a range holds it."""
+    assert entry.check(entry.default) == entry.default
+    if entry.range is None:
+        assert repr(entry.default) in entry.accepted
+
+
+@pytest.mark.parametrize("wrong", ["Kept", "kept ", "", 1, 0.5, True, None, ["kept"], b"kept"])
+def test_wrong_words_are_refused_with_the_list(wrong: Any) -> None:
+    """A word that is not registered is refused; the error names field, id and accepted values."""
+    with pytest.raises(ChoiceError) as caught:
+        WORD.check(wrong)
+    assert str(caught.value) == (
+        f"Some.word = {wrong!r} is not accepted (choice WORD): use 'new', 'kept', 'reset'"
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["5", True, False, None, [5], 2.5, 0, 10, float("nan"), float("inf"), -float("inf"), 10**400],
+)
+def test_wrong_numbers_are_refused(wrong: Any) -> None:
+    """A value of the wrong type, a fraction, and what is outside the range are refused."""
+    with pytest.raises(ChoiceError, match=r"Some\.n = .* \(choice N\): use a whole number from 1 "):
+        WHOLE.check(wrong)
+    if wrong not in (0, 5):
+        with pytest.raises(ChoiceError, match=r"choice X\): use a number from 0\.0 to 1\.0$"):
+            REAL.check(wrong)
+    with pytest.raises(ChoiceError, match=r"\(choice STEP\): use 4, 1, 2$"):
+        STEP.check(wrong)
+
+
+def test_numbers_take_the_type_of_the_default() -> None:
+    """A whole float counts as an integer where one is due, an integer as a float."""
+    for entry, value, due in ((WHOLE, 7.0, 7), (STEP, 2.0, 2), (REAL, 1, 1.0)):
+        checked = entry.check(value)
+        assert checked == due
+        assert type(checked) is type(due)
+
+
+def test_ends_of_a_range_belong_to_it() -> None:
+    """Both ends of a range are accepted, and nothing beyond."""
+    assert [WHOLE.check(value) for value in (1, 9)] == [1, 9]
+    assert [REAL.check(value) for value in (0.0, 1.0)] == [0.0, 1.0]
+    with pytest.raises(ChoiceError):
+        REAL.check(1.0 + 1e-15)
+
+
+def test_near_miss_is_suggested() -> None:
+    """An unknown name is answered with the nearest known one, and with all of them."""
+    error = unknown_name("aplha", ["alpha", "beta"], "parameter")
+    assert str(error) == ("unknown parameter 'aplha' (did you mean 'alpha'?); known: alpha, beta")
+    assert "did you mean" not in str(unknown_name("xyz", ["alpha", "beta"], "parameter"))
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [('id = "A"', "has the id 'A' twice"), ('id = "B"\ntypo = 1', "entry 'B': .*'typo'")],
+)
+def test_register_with_a_slip_is_refused(
+    more: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An id that stands twice, and a key that does not exist, stop the program."""
+    rest = '\nplace = "p"\nopen = "o"\ndefault = 1\nrule = "r"\n'
+    text = f'[[choice]]\nid = "A"{rest}[[choice]]\n{more}{rest}'
+    (tmp_path / "choices.toml").write_text(text)
+    monkeypatch.setattr(choices.resources, "files", lambda package: tmp_path)
+    with pytest.raises(ChoiceError, match=message):
+        register.__wrapped__()
+
+
+def test_stated_values_are_told_from_open_ones() -> None:
+    """The learning rate is stated by the paper; the update rate of the trace is not."""
+    assert register()["BETA"].is_stated
+    assert not register()["ALPHA"].is_stated

@@ -1,0 +1,313 @@
+"""The command line: what it prints, where it writes and how it ends."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from importlib import metadata
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_notebook
+from typer.testing import CliRunner, Result
+
+from replication import Fit, MazeError, cli, paths, regenerate, save_demos
+from replication.choices import register
+from replication.demos import Demos, json_schema
+from replication.irl import METHODS
+
+
+def replicate(*words: str | Path) -> Result:
+    """Run the command in this process."""
+    return CliRunner().invoke(cli.app, [str(word) for word in words])
+
+
+def refused(*words: str | Path) -> str:
+    """Return the error line of a command that must be refused."""
+    result = replicate(*words)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert re.fullmatch(r"error: .+\n", result.stderr)
+    return result.stderr
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Set up a project folder with one notebook, `toy`, that writes the table `seen.md`."""
+    cells = [
+        new_code_cell('out = "x"\ntrials = 3\nname = "a"\nseed = 1\njobs = 1'),
+        new_code_cell(
+            "from pathlib import Path\n"
+            "if trials == 0: raise ValueError('no trials')\n"
+            "(Path(out) / 'seen.md').write_text(f'| {trials} | {name!r} | {seed} | {jobs} |')"
+        ),
+    ]
+    cells[0].metadata["tags"] = ["parameters"]
+    node = new_notebook(cells=cells)
+    node.metadata["replication"] = {"outputs": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
+    (tmp_path / "notebooks").mkdir()
+    nbformat.write(node, tmp_path / "notebooks" / "toy.ipynb")
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def demo_file(tmp_path: Path, small_demos: Demos) -> Path:
+    """Write a small demonstration file."""
+    path = tmp_path / "small.json"
+    save_demos(small_demos, path)
+    return path
+
+
+# --- run -------------------------------------------------------------------------------------
+
+
+def test_run_writes_shows_and_tells(project: Path) -> None:
+    """All notebooks run by default; tables are shown, and the folders are named."""
+    words = ["-p", "name", "x=y", "-p", "trials", "-4", "--seed", "9", "--jobs", "2"]
+    result = replicate("run", "--profile", "quick", *words)
+    assert result.exit_code == 0
+    table = "| -4 | 'x=y' | 9 | 2 |"
+    assert (project / "build" / "quick" / "seen.md").read_text() == table
+    assert table in result.stdout
+    assert str(project / "build" / "quick") in result.stdout
+    assert str(project / "build" / "executed" / "quick") in result.stdout
+    assert not (project / "figures").exists()
+
+
+def test_failing_cell_shows_its_traceback(project: Path) -> None:
+    """The cell's own traceback, without colours, comes before the error line; exit code 1."""
+    result = replicate("run", "toy", "-p", "trials", "0", "--out", project / "here")
+    assert result.exit_code == 1
+    assert "----> 2 if trials == 0" in result.stderr
+    assert "\x1b" not in result.stderr
+    last = result.stderr.splitlines()[-1]
+    assert re.fullmatch(r"error: .*toy\.ipynb: cell 2 failed: ValueError: no trials", last)
+    assert list((project / "here").iterdir()) == []
+
+
+def test_run_refuses_in_one_line(project: Path) -> None:
+    """Unknown notebooks, parameters, types and half options are named in one line."""
+    assert "unknown notebook 'toi' (did you mean 'toy'?)" in refused("run", "toi")
+    assert "there is no notebook no/such.ipynb" in refused("run", "no/such.ipynb")
+    assert "(did you mean 'trials'?)" in refused("run", "-p", "trails", "1")
+    assert "'name' is text" in refused("run", "-p", "name", "1")
+    assert "'trials' is a whole number" in refused("run", "-p", "trials", "NaN")
+    assert "'trials' is a whole number" in refused("run", "-p", "trials", "1.0")
+    assert "-p takes two words" in refused("run", "-p", "trials")
+    assert "-p takes two words" in refused("run", "-p", "trials=1", "toy")
+    assert "-p trials is given twice" in refused("run", "-p", "trials", "1", "-p", "trials", "2")
+    assert "use --out" in refused("run", "-p", "out", "x")
+    figures = project / "figures"
+    assert "profile 'paper'" in refused("run", "--profile", "quick", "--out", figures)
+    (project / "notebooks" / "toy.ipynb").unlink()
+    assert "there is no notebook in" in refused("run")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3", 3),
+        ("-0.5", -0.5),
+        ("true", True),
+        ("null", None),
+        ('{"a": [1]}', {"a": [1]}),
+        ('"3"', "3"),
+        ("hit+detour", "hit+detour"),
+        ("", ""),
+        ("a=b", "a=b"),
+        ("Infinity", "Infinity"),
+        ("[1,", "[1,"),
+    ],
+)
+def test_values_are_json_or_else_text(text: str, value: object) -> None:
+    """What parses as JSON is JSON, everything else is text."""
+    assert cli._values([f"name={text}"]) == {"name": value}
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
+    """Ctrl-C, or a polite kill, ends a run in one line, code 130, and leaves no kernel."""
+    cells = [
+        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
+        new_code_cell(
+            f"import os, pathlib, time\npathlib.Path({str(tmp_path / 'pid')!r})"
+            ".write_text(f'{os.getpid()}\\n')\ntime.sleep(300)"
+        ),
+    ]
+    node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
+    nbformat.write(node, tmp_path / "sleep.ipynb")
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from pathlib import Path; from replication import cli, paths\n"
+        f"paths.PROJECT = Path({str(tmp_path)!r}); cli.app()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "run", str(tmp_path / "sleep.ipynb")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"TMPDIR": str(scratch)},
+    )
+    pid = tmp_path / "pid"
+    while process.poll() is None and not (pid.exists() and pid.read_text().endswith("\n")):
+        time.sleep(0.05)
+    process.send_signal(getattr(signal, name))
+    assert process.communicate()[1] == "error: interrupted\n"
+    assert process.returncode == 130
+    assert list(scratch.iterdir()) == []
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
+
+
+# --- learn -----------------------------------------------------------------------------------
+
+
+def test_learn_writes_result_and_picture(demo_file: Path, tmp_path: Path) -> None:
+    """The file can be read again and is what was asked for; the lines say what came out."""
+    words: list[str | Path] = [
+        "--seed",
+        "3",
+        "--incorrect",
+        "hit",
+        "-p",
+        "alpha",
+        "0.1",
+        "--out",
+        tmp_path / "out",
+    ]
+    result = replicate("learn", demo_file, *words)
+    assert result.exit_code == 0
+    found = Fit.load(tmp_path / "out" / "small-unified-incorrect.json")
+    assert (found.seed, found.params.update.alpha, found.demos.kinds) == (3, 0.1, ("hit",))
+    assert found.converged
+    assert f"converged after {found.iterations} iterations, d = 0\n" in result.stdout
+    picture = tmp_path / "out" / "small-unified-incorrect.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert str(picture) in result.stdout
+
+
+def test_learn_says_that_it_has_not_converged(demo_file: Path, tmp_path: Path) -> None:
+    """A result at the iteration cap is a result, exit code 0, but never called converged."""
+    cap = str(register()["ITERATION-CAP"].range[0])  # type: ignore[index]
+    words: list[str | Path] = ["--out", tmp_path, "--method", "unified"]
+    result = replicate("learn", demo_file, *words, "-p", "max_iterations", cap)
+    assert result.exit_code == 0
+    assert f"NOT converged after {cap} iteration" in result.stdout
+
+
+def test_learn_refuses_in_one_line(demo_file: Path, tmp_path: Path) -> None:
+    """Unknown methods, parameters, kinds and files are named in one line."""
+    for name in METHODS:
+        assert name in refused("learn", demo_file, "--method", "adabost")
+    assert "(did you mean 'alpha'?)" in refused("learn", demo_file, "-p", "alhpa", "1")
+    assert "choice ALPHA" in refused("learn", demo_file, "-p", "alpha", "text")
+    assert "no incorrect demo of kind 'speed'" in refused(
+        "learn", demo_file, "--incorrect", "speed"
+    )
+    words = ["--method", "unified", "--incorrect", "hit"]
+    assert "uses no incorrect demos" in refused("learn", demo_file, *words)
+    assert "nothing.json" in refused("learn", tmp_path / "nothing.json")
+    assert "small.json" in refused("learn", demo_file, "--out", demo_file / "below")
+
+
+# --- demos and choices -----------------------------------------------------------------------
+
+
+def test_check_tells_about_each_file(demo_file: Path, tmp_path: Path) -> None:
+    """Good files are ok, bad ones have one line each, and the exit code tells."""
+    assert replicate("demos", "check", demo_file).stdout == f"{demo_file}: ok\n"
+    bad = tmp_path / "bad.json"
+    bad.write_text("{")
+    result = replicate("demos", "check", bad, demo_file)
+    assert result.exit_code == 1
+    assert result.stdout == f"{demo_file}: ok\n"
+    assert re.fullmatch(r"error: .*bad\.json.*\n", result.stderr)
+
+
+def test_check_shows_warnings(demo_file: Path) -> None:
+    """A file that can be used, but not matched exactly, has its warnings and exit code 0."""
+    document = json.loads(demo_file.read_text())
+    first = document["correct"][0]
+    actions = sorted(first["actions"])
+    detour = {"name": "other", "actions": actions}
+    assert actions != first["actions"]
+    document["correct"].append(detour)
+    demo_file.write_text(json.dumps(document))
+    result = replicate("demos", "check", demo_file)
+    assert result.exit_code == 0
+    assert f"{demo_file}: warning: " in result.stdout
+    assert ": ok" not in result.stdout
+
+
+def test_schema_is_printed() -> None:
+    """The printed schema is the one that files are checked with."""
+    assert json.loads(replicate("demos", "schema").stdout) == json_schema()
+
+
+def test_choices_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every entry is in the table, which keeps to the terminal, and each is shown whole."""
+    monkeypatch.setenv("COLUMNS", "120")
+    table = replicate("choices").stdout
+    assert max(map(len, table.splitlines())) <= 120
+    joined = re.sub(r"\s", "", table)
+    for id, one in register().items():
+        assert id in joined
+        whole = " ".join(replicate("choices", id.lower()).stdout.split())
+        assert id in whole
+        assert one.rule in whole
+    assert "(did you mean 'ALPHA'?)" in refused("choices", "alpa")
+
+
+# --- the rest --------------------------------------------------------------------------------
+
+
+def test_version() -> None:
+    """The version is the installed package's."""
+    version = metadata.version("unified-irl-replication")
+    assert replicate("--version").stdout == f"replicate {version}\n"
+
+
+def test_faults_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only errors that the package raises on purpose are taken for the user's."""
+    for error, code in ((MazeError("mine"), 2), (ValueError("numpy's"), 1)):
+
+        def fail(error: ValueError = error) -> None:
+            raise error
+
+        monkeypatch.setattr("replication.demos.json_schema", fail)
+        result = replicate("demos", "schema")
+        assert result.exit_code == code
+        assert ("error: mine" in result.stderr) == (code == 2)
+
+
+def test_help_loads_nothing_heavy() -> None:
+    """Looking at the help imports neither papermill nor matplotlib."""
+    code = (
+        "import sys; from replication.cli import app; app(['--help'], standalone_mode=False)\n"
+        "print(sorted({'papermill', 'matplotlib', 'pandas'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_time_limit_has_one_default() -> None:
+    """The help shows the limit that the library has."""
+    assert f"default: {regenerate.TIMEOUT}" in replicate("run", "--help").stdout
+
+
+def test_paths_prefer_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file here wins over one in the project; an absolute path stays as it is."""
+    monkeypatch.chdir(tmp_path)
+    name = "data/demos/open_maze.json"
+    assert paths.resolve(name) == paths.PROJECT / name
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).touch()
+    assert paths.resolve(name) == tmp_path / name
+    assert paths.resolve(tmp_path / "none") == tmp_path / "none"

@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from replication.expectations import feature_expectations
+from replication.irl import Trial, get_method, iterate, run
+from replication.params import Params
+
+Array = NDArray[np.float64]
+GAMMA = 0.9
+NEXT = np.array([[1, 0], [2, 0], [3, 1], [4, 2], [4, 4]])  # a corridor of five: right, left
+EXPERT = np.array([0, 1, 2, 3, 4]), np.array([0, 0, 0, 0])
+
+
+@dataclass
+class Corridor:
+    """Five cells in a row, solved exactly; it counts its calls."""
+
+    shape: tuple[int, int] = (5, 2)
+    calls: int = 0
+
+    def learn(
+        self, weights: Array, q: Array, streams: NDArray[np.uint64]
+    ) -> tuple[Array, NDArray[np.uint64], NDArray[np.int64]]:
+        """Solve the corridor by value iteration."""
+        self.calls += 1
+        value = np.zeros((len(q), 5))
+        for _ in range(200):
+            q = weights + GAMMA * value[:, NEXT]
+            value = q.max(axis=2)
+            value[:, 4] = 0.0
+        return q, streams + np.uint64(1), np.full(len(q), 7)
+
+    def roll_out(
+        self, q: Array, stream: NDArray[np.uint64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
+        """Follow the greedy policy for at most 30 steps."""
+        states, actions = [0], []
+        while states[-1] != 4 and len(actions) < 30:
+            actions.append(int(np.argmax(q[states[-1], ::-1]) == 0))  # ties go left
+            states.append(int(NEXT[states[-1], actions[-1]]))
+        return np.array(states), np.array(actions), stream
+
+
+def _mu_e() -> Array:
+    return feature_expectations(*EXPERT, gamma=GAMMA, shape=(5, 2))
+
+
+def _trial(method: str = "unified", *, keep: bool = False, **choices: object) -> Trial:
+    task = Corridor()
+    mu_b = np.zeros((5, 2), dtype=bool)
+    loop = iterate(
+        task,
+        get_method(method),
+        _mu_e(),
+        mu_b,
+        Params.of(**choices),
+        seed=np.random.SeedSequence(1),
+        keep=keep,
+    )
+    ((position, trial),) = run(task, [loop])
+    assert position == 0
+    return trial
+
+
+@pytest.mark.parametrize("method", ["unified", "unified-incorrect", "adaboost"])
+def test_every_method_learns_the_right_ordering(method: str) -> None:
+    """In a corridor that the expert walks to the end, each method does so too, with d exactly 0."""
+    trial = _trial(method)
+    assert trial.converged
+    assert trial.errors[-1] == 0
+    np.testing.assert_array_equal(trial.states, EXPERT[0])
+    assert (trial.q[:4, 0] > trial.q[:4, 1]).all()
+
+
+def test_iterations_count_weight_updates() -> None:
+    """ITERATION-COUNT: one error for each trajectory, one learning call for each iteration."""
+    trial = _trial()
+    assert trial.iterations == len(trial.errors) - 1 > 0
+    assert trial.steps == 7 * trial.iterations
+
+
+def test_first_error_is_that_of_the_first_trajectory() -> None:
+    """Eq. 6 by hand: the first agent bumps into the left end 30 times."""
+    mu_i = np.zeros((5, 2))
+    mu_i[0, 1] = sum(GAMMA**t for t in range(30))
+    assert _trial().errors[0] == pytest.approx(np.linalg.norm(_mu_e() - mu_i))
+
+
+def test_cap_ends_a_trial_and_marks_it() -> None:
+    """A trial that reaches the cap says that it did not converge."""
+    trial = _trial(max_iterations=1)
+    assert not trial.converged
+    assert trial.iterations == 1
+
+
+def test_larger_threshold_stops_earlier() -> None:
+    """Every error but the last is above the threshold, and the last is not."""
+    trial = _trial(threshold=0.5)
+    assert (trial.errors[:-1] > 0.5).all()
+    assert trial.errors[-1] <= 0.5
+
+
+def test_snapshots_begin_before_and_end_after_learning() -> None:
+    """Entry i of the snapshots is the state after i updates; they change nothing else."""
+    plain, trial = _trial(), _trial(keep=True)
+    assert trial.snapshots is not None
+    assert len(trial.snapshots.weights) == trial.iterations + 1
+    assert not trial.snapshots.weights[0].any()
+    np.testing.assert_array_equal(trial.snapshots.weights[-1], trial.weights)
+    np.testing.assert_array_equal(trial.snapshots.q[-1], trial.q)
+    np.testing.assert_array_equal(trial.snapshots.states[-1], trial.states)
+    np.testing.assert_array_equal(plain.errors, trial.errors)
+
+
+def test_weights_are_the_sum_of_the_updates() -> None:
+    """Eq. 9 along a whole trial: the snapshots' weights follow from their trajectories."""
+    trial = _trial(keep=True)
+    assert trial.snapshots is not None
+    f, w = np.full((5, 2), 0.5), np.zeros((5, 2))
+    for i in range(trial.iterations):
+        mu_i = feature_expectations(
+            trial.snapshots.states[i], trial.snapshots.actions[i], gamma=GAMMA, shape=(5, 2)
+        )
+        residual = _mu_e() - mu_i
+        w = w + f * residual
+        f = f + 0.5 * ((residual != 0) - f)
+        np.testing.assert_array_equal(trial.snapshots.weights[i + 1], w)
+
+
+@pytest.mark.parametrize(("q_start", "from_zero"), [("reset", True), ("kept", False)])
+def test_q_is_reset_or_kept(q_start: str, from_zero: bool) -> None:
+    """Q-START decides what the second learning call starts from."""
+    task = Corridor()
+    loop = iterate(
+        task,
+        get_method("unified"),
+        _mu_e(),
+        np.zeros((5, 2), dtype=bool),
+        Params.of(q_start=q_start, max_iterations=2, threshold=1e-9),
+        seed=np.random.SeedSequence(1),
+    )
+    answer, requests = None, []
+    for _ in range(2):
+        request = loop.send(answer)  # type: ignore[arg-type]
+        requests.append(request)
+        answer = (np.full((5, 2), -1.0), request.stream, 1)
+    assert (not requests[1].q.any()) == from_zero
+
+
+def test_unit_norm_normalises_every_update() -> None:
+    """W-NORM unit keeps the norm of the weights at 1, as Eq. 4 assumes."""
+    trial = _trial(keep=True, w_norm="unit")
+    assert trial.snapshots is not None
+    norms = np.linalg.norm(trial.snapshots.weights[1:], axis=(1, 2))
+    np.testing.assert_allclose(norms, 1.0)
+
+
+def test_random_start_weights_come_from_the_seed() -> None:
+    """W-START draws small positive weights, the same for the same seed."""
+    one, other = (_trial(keep=True, w_start="uniform-0.001") for _ in range(2))
+    assert one.snapshots is not None
+    assert other.snapshots is not None
+    first = one.snapshots.weights[0]
+    assert (first > 0).all()
+    assert (first < 0.001).all()
+    np.testing.assert_array_equal(first, other.snapshots.weights[0])
+
+
+def test_trials_side_by_side_learn_in_one_call() -> None:
+    """Each iteration of several trials is one call of the task, and each trial comes out alone."""
+    task = Corridor()
+    loops = [
+        iterate(
+            task,
+            get_method(name),
+            _mu_e(),
+            np.zeros((5, 2), dtype=bool),
+            Params(),
+            seed=np.random.SeedSequence(1),
+        )
+        for name in ("unified", "adaboost")
+    ]
+    together = dict(run(task, loops))
+    assert sorted(together) == [0, 1]
+    assert task.calls == max(trial.iterations for trial in together.values())
+    for position, name in enumerate(("unified", "adaboost")):
+        np.testing.assert_array_equal(together[position].errors, _trial(name).errors)
+
+
+def test_an_expert_matched_at_once_needs_no_iteration() -> None:
+    """No error at the first trajectory means zero iterations and no learning."""
+    task = Corridor()
+    states, actions, _ = task.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
+    mu = feature_expectations(states, actions, gamma=GAMMA, shape=(5, 2))
+    loop = iterate(
+        task,
+        get_method("unified"),
+        mu,
+        np.zeros((5, 2), dtype=bool),
+        Params(),
+        seed=np.random.SeedSequence(1),
+    )
+    ((_, trial),) = run(task, [loop])
+    assert (trial.iterations, trial.converged, task.calls) == (0, True, 0)

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import pytest
+
+from replication.choices import Choice, ChoiceError, Chosen, Value, register
+from replication.params import Demonstrations, Expert, Learner, Loop, Params, Report, Update
+
+KINDS: tuple[type[Chosen], ...] = (Demonstrations, Learner, Loop, Update, Expert, Report)
+FIELDS = [
+    (kind, field.name, register()[field.metadata["choice"]])
+    for kind in KINDS
+    for field in dataclasses.fields(kind)  # type: ignore[arg-type] # they are dataclasses
+]
+NAMES = [f"{kind.__name__}.{name}" for kind, name, _ in FIELDS]
+JUNK: list[Any] = [
+    *(None, True, False, "", "zero ", "NaN", b"zero", [], [0.5], {}, 0.123456),
+    *(math.nan, math.inf, -math.inf, -1, 10**400, -(10**400)),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "entry"), FIELDS, ids=NAMES)
+def test_registered_values_are_accepted(kind: type[Chosen], name: str, entry: Choice) -> None:
+    """The default, each alternative and the ends of a range are taken as they are."""
+    assert getattr(kind(), name) == entry.default
+    ends = [] if entry.range is None else [type(entry.default)(end) for end in entry.range]
+    for value in (entry.default, *entry.alternatives, *ends):
+        held = getattr(kind(**{name: value}), name)
+        assert held == value
+        assert type(held) is type(entry.default)
+
+
+@pytest.mark.parametrize(("kind", "name", "entry"), FIELDS, ids=NAMES)
+def test_everything_else_is_refused(kind: type[Chosen], name: str, entry: Choice) -> None:
+    """Flags, NaN, infinities, other types and unregistered numbers raise and name the field."""
+    wrong = list(JUNK)
+    if entry.range is not None:
+        wrong += [entry.range[0] - 1, entry.range[1] + 1]
+        if isinstance(entry.default, float):
+            wrong.remove(0.123456)
+    if isinstance(entry.default, int):
+        wrong += [entry.default + 0.5, str(entry.default)]
+    if isinstance(entry.default, str):
+        wrong += [0, 1, 0.0]
+    for value in wrong:
+        with pytest.raises(ChoiceError, match=rf"^{kind.__name__}\.{name} = .*{entry.id}"):
+            kind(**{name: value})
+
+
+def test_whole_floats_and_integers_are_one_number() -> None:
+    """A notebook's 4.0 for an integer and 1 for a float become what the field holds."""
+    assert Params.of(episodes=10.0, beta=1) == Params.of(episodes=10, beta=1.0)
+    assert isinstance(Params.of(episodes=10.0).learner.episodes, int)
+    assert isinstance(Params.of(beta=1).learner.beta, float)
+
+
+def test_defaults_do_not_differ() -> None:
+    """Default parameters differ from the register in nothing, named or not."""
+    assert Params().differences() == {}
+    assert Params.of() == Params()
+    assert Params.of(**Params().values()).differences() == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "entry"), [(n, e) for k, n, e in FIELDS if k not in (Expert, Report)], ids=lambda x: x
+)
+def test_a_change_is_listed_by_its_id(name: str, entry: Choice) -> None:
+    """One value that is not the default is the one difference, under the id of its choice."""
+    others: list[Value] = list(entry.alternatives)
+    if entry.range is not None:
+        others = [type(entry.default)(entry.range[0])]
+    for value in others:
+        changed = Params.of(**{name: value})
+        assert changed.differences() == {entry.id: value}
+        assert changed != Params()
+
+
+def test_values_make_the_same_parameters_again() -> None:
+    """Values by name are complete: they build equal parameters, in an order that never changes."""
+    chosen = Params.of(alpha=0.9, ties="first", incorrect="all", max_iterations=7)
+    assert Params.of(**chosen.values()) == chosen
+    assert list(chosen.values()) == list(Params().values())
+    assert chosen.values()["max_iterations"] == 7
+
+
+def test_names_are_unambiguous() -> None:
+    """No two concerns share the name of a field, so that a name alone says which is meant."""
+    parts = (Demonstrations, Learner, Loop, Update)
+    names = [field.name for part in parts for field in dataclasses.fields(part)]
+    assert len(set(names)) == len(names) == len(Params().values())
+
+
+@pytest.mark.parametrize(
+    ("name", "near"), [("aplha", "alpha"), ("q-start", "q_start"), ("episode", "episodes")]
+)
+def test_unknown_name(name: str, near: str) -> None:
+    """A misspelt name is refused with the nearest one and the list of all."""
+    with pytest.raises(ChoiceError, match=f"unknown parameter '{name}'.*mean '{near}'.*w_start"):
+        Params.of(**{name: 1})
+
+
+def test_parameters_of_other_concerns_are_unknown() -> None:
+    """What does not determine a trial is not among its parameters."""
+    for name in ("leg", "trials", "learner"):
+        with pytest.raises(ChoiceError, match="unknown parameter"):
+            Params.of(**{name: 4})
+
+
+def test_parameters_are_frozen() -> None:
+    """Parameters cannot be changed past their check, and equal ones have equal hashes."""
+    chosen = Params.of(alpha=0.1)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        chosen.update.alpha = 2.0  # type: ignore[misc]
+    assert hash(chosen) == hash(Params.of(alpha=0.1))

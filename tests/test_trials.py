@@ -1,0 +1,179 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from replication import Demos
+from replication.params import Params
+from replication.seeds import trial_seeds
+from replication.setting import Setting
+from replication.store import Store
+from replication.trials import CHUNK, TRACED_TRIAL, Results, run_trials, trial_key
+
+FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
+
+
+def _settings(demos: Demos) -> list[Setting]:
+    return [
+        Setting(demos, method, Params.of(**FEW))
+        for method in ("adaboost", "unified", "unified-incorrect")
+    ]
+
+
+def _run(demos: Demos, path: Path, *, jobs: int = 1, trials: int = 4, seed: int = 5) -> Results:
+    return run_trials(_settings(demos), trials=trials, store=Store(path), jobs=jobs, seed=seed)
+
+
+def _bits(results: Results) -> list[bytes]:
+    return [
+        array.tobytes()
+        for setting in results.settings
+        for k in range(results.trials)
+        for trial in [results.trial(setting, k)]
+        for array in (trial.errors, trial.weights, trial.q, trial.states, trial.actions)
+    ]
+
+
+@pytest.mark.parametrize("jobs", [2, 4])
+def test_workers_do_not_change_a_bit(small_demos: Demos, tmp_path: Path, jobs: int) -> None:
+    """One, two and four workers give the same bits."""
+    alone = _run(small_demos, tmp_path / "one.sqlite", trials=CHUNK + 3)
+    shared = _run(small_demos, tmp_path / "many.sqlite", jobs=jobs, trials=CHUNK + 3)
+    assert _bits(alone) == _bits(shared)
+
+
+def test_a_trial_does_not_depend_on_how_many_there_are(small_demos: Demos, tmp_path: Path) -> None:
+    """The first trials of a long run are those of a short one."""
+    short = _run(small_demos, tmp_path / "short.sqlite", trials=2)
+    long = _run(small_demos, tmp_path / "long.sqlite", trials=6)
+    assert set(_bits(short)) <= set(_bits(long))
+
+
+def test_finished_trials_are_not_computed_again(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second run reads the store only, and more trials compute just the new ones."""
+    first = _run(small_demos, store_path)
+    computed: list[list[int]] = []
+
+    def spy(self: Setting, *, seed: np.random.SeedSequence, keep: bool = False) -> None:
+        computed.append(list(seed.spawn_key))
+        raise AssertionError("a finished trial was computed again")
+
+    monkeypatch.setattr(Setting, "trial", spy)
+    assert _bits(_run(small_demos, store_path)) == _bits(first)
+    assert computed == []
+    with pytest.raises(AssertionError):
+        _run(small_demos, store_path, trials=5)
+    assert computed == [[4]]
+
+
+def test_frame_has_one_row_a_trial(small_demos: Demos, store_path: Path) -> None:
+    """The tidy table has every trial once, with what was asked for and what came out."""
+    results = _run(small_demos, store_path)
+    frame = results.frame()
+    assert list(frame.columns) == [
+        "task",
+        "method",
+        "trial",
+        "seed",
+        "iterations",
+        "converged",
+        "steps",
+        "choices",
+    ]
+    assert len(frame) == 12
+    assert not frame.duplicated(["method", "trial"]).any()
+    assert set(frame["choices"]) == {"EPISODES=60 HORIZON=40 ITERATION-CAP=40"}
+    setting = results.settings[0]
+    assert frame["iterations"].tolist()[:4] == results.iterations(setting).tolist()
+
+
+def test_errors_are_filled_up_with_their_last(small_demos: Demos, store_path: Path) -> None:
+    """Error curves of unequal length keep the last error: zero if converged, else not."""
+    short, long = (
+        Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": cap}))
+        for cap in (2, 40)
+    )
+    results = run_trials([short, long], trials=3, store=Store(store_path), seed=5)
+    assert (results.errors(short)[:, -1] > 0).all()
+    for k, row in enumerate(results.errors(long)):
+        curve = results.trial(long, k).errors
+        np.testing.assert_array_equal(row[: len(curve)], curve)
+        assert (row[len(curve) :] == curve[-1]).all()
+
+
+def test_a_capped_trial_is_marked(small_demos: Demos, store_path: Path) -> None:
+    """A trial that ended at the cap is in the table with the cap, and not converged."""
+    capped = Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 2}))
+    frame = run_trials([capped], trials=2, store=Store(store_path), seed=5).frame()
+    assert frame["converged"].tolist() == [False, False]
+    assert frame["iterations"].tolist() == [2, 2]
+
+
+def test_only_the_declared_trial_keeps_snapshots(small_demos: Demos, store_path: Path) -> None:
+    """FIG5-TRIAL: one trial of a setting keeps every iteration, the others their result."""
+    results = _run(small_demos, store_path)
+    for k in range(results.trials):
+        trial = results.trial(results.settings[0], k, snapshots=True)
+        assert (trial.snapshots is not None) == (k == TRACED_TRIAL)
+
+
+def test_key_changes_with_everything_that_matters(small_demos: Demos) -> None:
+    """Method, parameters, used demonstrations, root and trial each give another key."""
+    setting = Setting(small_demos, "unified-incorrect", Params.of(incorrect="all"))
+    shorter = replace(small_demos, incorrect=small_demos.incorrect[1:])
+    keys = [
+        trial_key(setting, 1, 0),
+        trial_key(setting, 1, 1),
+        trial_key(setting, 2, 0),
+        trial_key(replace(setting, method="unified"), 1, 0),
+        trial_key(replace(setting, params=Params.of(alpha=0.1)), 1, 0),
+        trial_key(replace(setting, params=Params.of(incorrect="opposite")), 1, 0),
+        trial_key(replace(setting, demos=shorter), 1, 0),
+    ]
+    assert len(set(keys)) == len(keys)
+
+
+def test_key_ignores_what_does_not_matter(small_demos: Demos) -> None:
+    """A new description, or incorrect demonstrations that the method never sees, change nothing."""
+    setting = Setting(small_demos, "unified", Params())
+    described = replace(small_demos, description="other words", incorrect=())
+    same = Setting(described, "unified", Params.of(incorrect="none"))
+    assert trial_key(setting, 1, 0) == trial_key(same, 1, 0)
+
+
+def test_methods_share_their_seeds(small_demos: Demos, store_path: Path) -> None:
+    """Paired comparison: trial k of every method starts from the same first trajectory."""
+    results = _run(small_demos, store_path)
+    first = {
+        tuple(results.trial(setting, k).errors[0] for k in range(results.trials))
+        for setting in results.settings
+    }
+    assert len(first) == 1
+    assert len(set(next(iter(first)))) > 1
+
+
+def test_equal_settings_are_run_once(small_demos: Demos, store_path: Path) -> None:
+    """A setting that is given twice appears once in the results."""
+    setting = Setting(small_demos, "unified", Params.of(**FEW))
+    results = run_trials([setting, setting], trials=2, store=Store(store_path), seed=1)
+    assert len(results.frame()) == 2
+
+
+def test_trial_seeds_are_the_children_of_the_root() -> None:
+    """The seeds are numpy's own spawned children."""
+    ours = [seed.generate_state(2).tolist() for seed in trial_seeds(3, 4)]
+    assert ours == [s.generate_state(2).tolist() for s in np.random.SeedSequence(3).spawn(4)]
+
+
+def test_frame_survives_csv(small_demos: Demos, store_path: Path, tmp_path: Path) -> None:
+    """What is written to trials.csv reads back as the same table."""
+    frame = _run(small_demos, store_path).frame()
+    frame.to_csv(tmp_path / "trials.csv", index=False)
+    read = pd.read_csv(tmp_path / "trials.csv", keep_default_na=False)
+    pd.testing.assert_frame_equal(frame, read, check_dtype=False)
