@@ -10,7 +10,7 @@ unexport PYTHONPATH PYTHONHOME
 # Nor may a local store of packages decide which versions and files the lock names.
 unexport UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
-.PHONY: help reproduce quick test bench lint lock clean
+.PHONY: help reproduce quick test bench lint readme lock clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -34,6 +34,9 @@ lint: $(VENV)/.ready ## check style, types and the lock
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(RUN) tools/check_lock.py
+
+readme: $(VENV)/.ready ## bring the claims in README.md up to date with figures/
+	$(RUN) tools/readme.py
 
 # One version of a package for all Pythons (--fork-strategy fewest): the same numbers everywhere.
 lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check them on every Python

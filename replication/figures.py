@@ -95,6 +95,8 @@ class Curves:
         The trial that is drawn as a line.
     published
         Iteration at which the paper's curve is zero, if it is published.
+    dashed
+        So that a curve below, which may be the same, stays visible.
     """
 
     label: str
@@ -102,16 +104,18 @@ class Curves:
     errors: NDArray[np.float64]
     traced: int = 0
     published: int | None = None
+    dashed: bool = False
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Iterations of one setting, [trial], with the published mean if there is one."""
+    """Iterations of one setting, [trial], with the published mean; `dashed` as in Curves."""
 
     label: str
     colour: str
     iterations: NDArray[np.int64]
     published: float | None = None
+    dashed: bool = False
 
 
 def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "svg")) -> list[Path]:
@@ -165,10 +169,7 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
             panel.fill_between(iterations, low, high, color=one.colour, alpha=0.18, lw=0)
             traced = one.errors[one.traced]
             end = int(np.argmax(traced <= 0)) if (traced <= 0).any() else len(traced) - 1
-            dashes = "-" if one is curves[0] else (0, (4, 1.5))  # equal curves stay visible
-            panel.plot(
-                iterations[: end + 1], traced[: end + 1], color=one.colour, lw=1.1, ls=dashes
-            )
+            panel.plot(iterations[: end + 1], traced[: end + 1], **_line(one))
             panel.plot(end, traced[end], "o", color=one.colour, ms=4, clip_on=False, zorder=4)
             if one.published is not None:
                 panel.plot(
@@ -184,7 +185,7 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
         panel.set(title=title, xlabel="iteration", xlim=(0, None), ylim=(0, None))
     axes[0].set_ylabel("error d")
     first = next(iter(panels.values()))
-    handles = [Line2D([], [], color=one.colour, label=one.label) for one in first]
+    handles = [Line2D([], [], label=one.label, **_line(one)) for one in first]
     handles.append(
         Line2D([], [], color="0.4", marker="o", ms=4, lw=0, label="trial 0 reaches d = 0")
     )
@@ -209,8 +210,7 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     )
     for (left, right), (title, counts) in zip(np.atleast_2d(grid), panels.items(), strict=True):
         for position, one in enumerate(counts):
-            dashes = "-" if one is counts[0] else (0, (4, 1.5))
-            left.plot(one.iterations, color=one.colour, lw=0.9, ls=dashes)
+            left.plot(one.iterations, **_line(one))
             _draw_distribution(right, position, one)
         left.set_title(title, loc="left")
         left.set(ylabel="iterations", xlim=(-1, len(counts[0].iterations)), ylim=(0, None))
@@ -219,7 +219,7 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
         right.tick_params(labelleft=False)
     np.atleast_2d(grid)[-1, 0].set_xlabel("trial")
     first = next(iter(panels.values()))
-    handles = [Line2D([], [], color=one.colour, label=one.label) for one in first]
+    handles = [Line2D([], [], label=one.label, **_line(one)) for one in first]
     handles.append(Line2D([], [], color="0.3", marker="o", ms=5, lw=0, label="our mean"))
     if any(one.published is not None for counts in panels.values() for one in counts):
         handles.append(
@@ -317,6 +317,10 @@ def _figure(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tup
     FigureCanvasAgg(figure)
     axes = figure.subplots(n_rows, n_columns, **layout)
     return figure, np.atleast_1d(axes)
+
+
+def _line(one: Curves | Counts) -> dict[str, Any]:
+    return {"color": one.colour, "lw": 1.1, "ls": (0, (4, 1.5)) if one.dashed else "-"}
 
 
 def _legend_below(figure: Figure, handles: list[Line2D]) -> None:

@@ -170,9 +170,7 @@ class _Vector:
 
     def select(self, yes: Any, no: "_Vector") -> "_Vector":
         """Return `yes` where this mask holds, and `no` elsewhere."""
-        return _Vector(
-            self.builder, self.builder.select(self.value, no.like(yes).value, no.value)
-        )
+        return _Vector(self.builder, self.builder.select(self.value, no.like(yes).value, no.value))
 
     def any(self) -> Any:
         """Return, as a scalar, whether this mask holds in any lane."""

@@ -36,6 +36,7 @@ def error_panels(
                 results.errors(_setting(settings, name, f)),
                 TRACED_TRIAL,
                 published.get(name),
+                dashed=name == "unified-incorrect",
             )
             for name in methods
         ]
@@ -60,6 +61,7 @@ def iteration_panels(
                 COLOURS[name],
                 results.iterations(_setting(settings, name, f)),
                 published.get(name),
+                dashed=name == "unified-incorrect",
             )
             for name in methods
         ]

@@ -140,9 +140,9 @@ def power(differences: NDArray[np.float64], effect: float) -> float:
     if not np.isfinite(effect) or sd == 0:
         return float("nan")
     critical = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)
-    shift = effect / sd * np.sqrt(n)
-    # The square of a non-central t is a non-central F, which SciPy computes without NaN far out.
-    return float(stats.ncf.sf(critical**2, 1, n - 1, shift**2))
+    shift = abs(effect) / sd * np.sqrt(n)
+    wrong_side = stats.nct.cdf(-critical, n - 1, shift)  # SciPy's NaN where it vanishes
+    return float(stats.nct.sf(critical, n - 1, shift) + np.nan_to_num(wrong_side))
 
 
 def verdict_fewer(comparison: Comparison) -> str:

@@ -88,8 +88,8 @@ def claims_table(
 ) -> pd.DataFrame:
     """Return one row for each claim and reading of Eq. 9, with its verdict.
 
-    `p` is the test that belongs to the criterion (Welch's for means, Brown-Forsythe's for spread),
-    `p_holm` the same adjusted over all rows. Verdicts follow the criterion alone.
+    `p` is that of the paired signed-rank test for "fewer" and of the Brown-Forsythe test for
+    "steadier", `p_holm` the same adjusted over all rows. Verdicts follow the criterion alone.
     """
     rows = []
     for claim in claims:
@@ -108,7 +108,7 @@ def claims_table(
                     "judged": claim.judged,
                     **asdict(found),
                     "paper_difference": effect,
-                    "p": found.p_welch if fewer else found.p_spread,
+                    "p": found.p_wilcoxon if fewer else found.p_spread,
                     "verdict": verdict_fewer(found) if fewer else verdict_steadier(found),
                 }
             )

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import joblib
@@ -100,7 +100,8 @@ def run_trials(
     jobs
         Worker processes.
     progress
-        Whether to draw a bar; None draws it on a terminal only.
+        Whether to draw a bar; None draws it on a terminal, or as REPLICATION_PROGRESS (0 or 1)
+        says, by which `replicate run` lets its own terminal decide.
     seed
         Root seed.
     """
@@ -116,6 +117,8 @@ def run_trials(
         joblib.delayed(_compute)(setting, ks, seed) for setting, ks in chunks
     )
     total = sum(len(ks) for _, ks in chunks)
+    if progress is None and "REPLICATION_PROGRESS" in os.environ:
+        progress = os.environ["REPLICATION_PROGRESS"] == "1"
     disable = None if progress is None else not progress
     with tqdm(total=total, unit="trial", disable=disable, leave=False) as bar:
         steps = 0
@@ -149,8 +152,3 @@ def trial_key(setting: Setting, root: int, k: int) -> str:
         "versions": {"numba": numba.__version__, "numpy": np.__version__},
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def default_store(folder: Path) -> Store:
-    """Return the store of a working copy, `build/trials.sqlite` under its folder."""
-    return Store(folder / "build" / "trials.sqlite")

@@ -4,12 +4,13 @@ import dataclasses
 import importlib
 import inspect
 import pydoc
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from replication import choices, params
+from replication import params
 from replication.choices import Choice, ChoiceError, Chosen, register, unknown_name
 from replication.paths import PROJECT
 
@@ -145,7 +146,7 @@ def test_register_with_a_slip_is_refused(
     rest = '\nplace = "p"\nopen = "o"\ndefault = 1\nrule = "r"\n'
     text = f'[[choice]]\nid = "A"{rest}[[choice]]\n{more}{rest}'
     (tmp_path / "choices.toml").write_text(text)
-    monkeypatch.setattr(choices.resources, "files", lambda package: tmp_path)
+    monkeypatch.setattr(resources, "files", lambda package: tmp_path)
     with pytest.raises(ChoiceError, match=message):
         register.__wrapped__()
 

@@ -17,7 +17,8 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from replication import paths, regenerate
-from replication.regenerate import NotebookError, RunError, read_notebook, run_notebooks
+from replication.notebooks import NotebookError
+from replication.regenerate import RunError, run_notebooks
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
@@ -95,89 +96,6 @@ def test_bad_parameter_is_refused_before_any_notebook_runs(
     first = write(name="first", parameters=PARAMETERS + "\ntrails = 1" * ("trails" in given))
     with pytest.raises(NotebookError, match=re.escape(message)):
         run(first, write(name="second"), parameters=given)
-
-
-@pytest.mark.usefixtures("no_kernel")
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        (
-            'out = "x"\nn = 2 + 3',
-            "line 2 of the parameters cell, `n = 2 + 3`: only `name = literal`",
-        ),
-        ('out = "x"\nimport os', "line 2 of the parameters cell, `import os`"),
-        ('out = "x"\na = b = 1', "line 2 of the parameters cell, `a = b = 1`"),
-        ('out = "x"\na, b = 1, 2', "line 2 of the parameters cell"),
-        ('out = "x"\na = 1\na = 2', "line 3 of the parameters cell, `a = 2`: 'a' is there twice"),
-        ('out = "x"\npair = (1, 2)', "a parameter must be a JSON value"),
-        ('out = "x"\nhuge = 1e999', "a parameter must be a JSON value"),
-        ('out = "x"\n%matplotlib', "line 2 of the parameters cell is not Python"),
-        ("trials = 3", "must have out = 'FOLDER'"),
-    ],
-)
-def test_parameters_cell_holds_json_literals_only(
-    write: Write, run: Run, parameters: str, message: str
-) -> None:
-    """Any other line of the parameters cell is named and refused."""
-    with pytest.raises(NotebookError, match=re.escape(message)):
-        run(write(parameters=parameters))
-
-
-def test_literals_are_read_with_comments_and_signs(write: Write) -> None:
-    """Comments, negative numbers, null and nested values may stand in the parameters cell."""
-    source = 'out = "x"  # a folder\n# more\nn = -2\nnone = None\nsets = {"a": [1, {"b": True}]}'
-    expected = {"out": "x", "n": -2, "none": None, "sets": {"a": [1, {"b": True}]}}
-    assert read_notebook(write(parameters=source)).literals == expected
-
-
-@pytest.mark.usefixtures("no_kernel")
-@pytest.mark.parametrize(
-    ("declared", "message"),
-    [
-        ({"outputs": ["../a.png"]}, "'../a.png', which is not a plain file name"),
-        ({"outputs": ["/a.png"]}, "'/a.png', which is not a plain file name"),
-        ({"outputs": [".."]}, "'..', which is not a plain file name"),
-        ({"outputs": [1]}, "1, which is not a plain file name"),
-        ({"outputs": ["a.png", "a.png"]}, "'a.png' twice"),
-        ({"outputs": "a.png"}, "'outputs' must be a list"),
-        ({"merge": ["a.csv"]}, "unknown declaration 'merge' (did you mean 'merged'?)"),
-        ({"profiles": {"quick": 3}}, "'profiles' must hold an object"),
-        ({"profiles": {"quick": {"trails": 3}}}, "(did you mean 'trials'?)"),
-        ({"profiles": {"quick": {"trials": 0.5}}}, "'trials' is a whole number"),
-        ({"profiles": {"quick": {"out": "x"}}}, "sets 'out'"),
-    ],
-)
-def test_declarations_are_checked(
-    write: Write, run: Run, declared: dict[str, Any], message: str
-) -> None:
-    """A declaration that cannot be honoured is named and refused."""
-    with pytest.raises(NotebookError, match=re.escape(message)):
-        run(write(**declared))
-
-
-@pytest.mark.usefixtures("no_kernel")
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "cannot be read: no such file"),
-        (b"no JSON", "is not a valid notebook"),
-        (b"[]", "is not a valid notebook"),
-        (b"\xff\xfe", "is not a valid notebook"),
-        (b'{"nbformat": 4, "nbformat_minor": 5, "cells": 3, "metadata": {}}', "not a valid"),
-        (b'{"nbformat": 4, "nbformat_minor": 5, "cells": [], "metadata": {}}', "0 cells have"),
-    ],
-)
-def test_file_that_is_no_notebook_is_refused(
-    tmp_path: Path, run: Run, content: bytes | None, message: str
-) -> None:
-    """Whatever the file holds, the error is one line with its name."""
-    path = tmp_path / "broken.ipynb"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(NotebookError, match=re.escape(message)) as caught:
-        run(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.usefixtures("no_kernel")

@@ -1,0 +1,194 @@
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from itertools import groupby, pairwise
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from replication import Demos, Maze, MazeError, demonstrate, load_demos
+from replication.expert import OPPOSITE, correct_actions
+from replication.paper import MOVES
+from replication.params import Expert
+from replication.paths import PROJECT
+
+STEPS = ((-1, 0), (1, 0), (0, 1), (0, -1))  # up, down, right, left
+DETOURS = ("detour", "near-detour", "far-detour")
+LEGS = [1, 2, 4, 8, 16]
+
+
+@st.composite
+def mazes(draw: st.DrawFn, most: int = 7) -> Maze:
+    """Any small maze, of any shape."""
+    n_columns, n_rows = draw(st.integers(2, most)), draw(st.integers(2, most))
+    size = n_rows * n_columns
+    cells = draw(st.lists(st.sampled_from("....#"), min_size=size, max_size=size))
+    start, goal = draw(st.permutations(range(size)))[:2]
+    cells[start], cells[goal] = "S", "G"
+    try:
+        return Maze(tuple("".join(cells[i : i + n_columns]) for i in range(0, size, n_columns)))
+    except MazeError as error:
+        assume("cannot be reached" not in str(error))
+        raise
+
+
+def shortest(rows: tuple[str, ...]) -> int:
+    """Count the moves from S to G on the text of a map, by breadth-first search."""
+    cells = {(r, c): x for r, row in enumerate(rows) for c, x in enumerate(row) if x != "#"}
+    (start,) = (cell for cell, x in cells.items() if x == "S")
+    moves, queue = {start: 0}, deque([start])
+    while queue:
+        row, column = queue.popleft()
+        if cells[row, column] == "G":
+            return moves[row, column]
+        for down, right in STEPS:
+            there = row + down, column + right
+            if there in cells and there not in moves:
+                moves[there] = moves[row, column] + 1
+                queue.append(there)
+    raise AssertionError("the goal cannot be reached")
+
+
+def all_ways(maze: Maze, state: int, left: int) -> Iterator[list[int]]:
+    """Enumerate all ways of exactly `left` moves from a state to the goal."""
+    if state == maze.goal:
+        if left == 0:
+            yield []
+        return
+    if left >= maze.distances()[state]:
+        for action, there in enumerate(maze.next_state[state].tolist()):
+            for rest in all_ways(maze, there, left - 1):
+                yield [action, *rest]
+
+
+def cost(actions: list[int], leg: int) -> int:
+    """Sum the squared differences of the legs' lengths from `leg`."""
+    return sum((len(list(moves)) - leg) ** 2 for _, moves in groupby(actions))
+
+
+@pytest.mark.parametrize("name", ["open_maze", "obstacle_maze"])
+def test_stored_files_follow_from_the_rules(name: str) -> None:
+    """A stored file is what the expert makes of its map with the registered parameters."""
+    stored = load_demos(PROJECT / "data" / "demos" / f"{name}.json")
+    made = demonstrate(stored.task, stored.environment, description=stored.description)
+    assert made == stored
+
+
+def test_stored_correct_demonstrations_are_the_papers_shortest_paths(stored_demos: Demos) -> None:
+    """31 and 33 moves, as the paper says, and no way in the map is shorter."""
+    (correct,) = stored_demos.correct
+    assert len(correct.actions) == MOVES[stored_demos.task]
+    assert len(correct.actions) == shortest(stored_demos.environment.rows)
+
+
+def test_stored_mazes_share_start_and_goal() -> None:
+    """Both mazes have 20 x 20 cells, the same start and the same goal; one has no obstacles."""
+    one, other = (
+        load_demos(PROJECT / "data" / "demos" / f"{name}.json").environment
+        for name in ("open_maze", "obstacle_maze")
+    )
+    assert one.shape == other.shape == (20, 20)
+    assert (one.start, one.goal) == (other.start, other.goal)
+    assert one.free.all()
+    assert not other.free.all()
+
+
+@given(maze=mazes(5), leg=st.sampled_from(LEGS))
+@settings(max_examples=150, deadline=None)
+def test_legs_are_the_best_of_all_shortest_paths(maze: Maze, leg: int) -> None:
+    """Of all shortest paths, the expert's has the least cost, and comes first among equals."""
+    ways = list(all_ways(maze, maze.start, shortest(maze.rows)))
+    assert correct_actions(maze, leg=leg) == min(ways, key=lambda way: (cost(way, leg), way))
+
+
+@pytest.mark.parametrize(
+    ("leg", "due"),
+    [(1, "0202020202"), (2, "0022002022"), (4, "0000022222"), (16, "0000022222")],
+)
+def test_leg_shapes(leg: int, due: str) -> None:
+    """In an empty square, short legs make a staircase and long ones a single corner."""
+    maze = Maze((".....G", *["......"] * 4, "S....."))
+    found = correct_actions(maze, leg=leg)
+    assert cost(found, leg) <= cost([int(action) for action in due], leg)
+    if leg != 2:
+        assert "".join(map(str, found)) == due
+
+
+def test_long_mazes_do_not_exhaust_the_stack() -> None:
+    """A corridor of the greatest length is driven from end to end."""
+    assert correct_actions(Maze(("S" + "." * 998 + "G",)), leg=4) == [2] * 999
+
+
+def test_hits_miss_each_corner() -> None:
+    """In a map solved by hand: straight on at each of two corners, until a move changes nothing."""
+    demos = demonstrate("t", Maze(("..#G", ".##.", "S...")), params=Expert(leg=4))
+    assert demos.correct[0].actions.tolist() == [2, 2, 2, 0, 0]
+    (hit,) = demos.select("hit").incorrect
+    assert hit.actions.tolist() == [2, 2, 2, 2]
+    assert hit.states.tolist() == [8, 9, 10, 11, 11]
+
+
+def test_near_detour_passes_the_cell_outside_the_corner() -> None:
+    """In a map solved by hand, the way leaves mid-leg, rounds the corner and joins mid-leg."""
+    maze = Maze((".......", ".....G.", ".......", ".......", ".S....."))
+    demos = demonstrate("t", maze)
+    assert demos.correct[0].actions.tolist() == [0, 0, 0, 2, 2, 2, 2]
+    (near,) = demos.select("near-detour").incorrect
+    assert near.actions.tolist() == [0, 3, 0, 0, 0, 2, 2, 2, 1, 2, 2]
+    assert maze.state(0, 0) in near.states
+
+
+def test_a_detour_is_narrower_where_it_has_to_be() -> None:
+    """Wide detours keep to the map; where not even one cell fits, there is none."""
+    rows = ("........", "......G.", "........", "........", "..S.....", "........")
+    demos = demonstrate("t", Maze(rows), params=Expert(detour_width=8))
+    (near,), (wide,) = (demos.select(kind).incorrect for kind in ("near-detour", "detour"))
+    assert wide.actions.tolist() == near.actions.tolist()
+    edge = demonstrate("t", Maze(("...G", "....", "S...")))
+    assert not set(DETOURS) & set(edge.kinds)
+
+
+@given(maze=mazes())
+@settings(max_examples=100, deadline=None)
+def test_demonstrations_of_any_maze(maze: Maze) -> None:
+    """Each kind keeps its rule in any maze; `Demos` itself checks that all moves are possible."""
+    demos = demonstrate("t", maze)
+    check_kinds(demos)
+
+
+def test_demonstrations_of_the_stored_mazes(stored_demos: Demos) -> None:
+    """Each kind keeps its rule in the paper's mazes, and each of the six kinds is there."""
+    check_kinds(stored_demos)
+    assert set(stored_demos.kinds) == {"hit", *DETOURS, "opposite"}
+    corners = sum(a != b for a, b in pairwise(stored_demos.correct[0].actions))
+    for kind in stored_demos.kinds:
+        number = len(stored_demos.select(kind).incorrect)
+        assert number == 1 if kind == "opposite" else 1 <= number <= corners
+
+
+def check_kinds(demos: Demos) -> None:
+    """Assert what tells each kind of incorrect demonstration."""
+    maze, (correct,) = demos.environment, demos.correct
+    actions = correct.actions.tolist()
+    corners = [t for t, (a, b) in enumerate(pairwise(actions), start=1) if a != b]
+    for demo in demos.incorrect:
+        taken = demo.actions.tolist()
+        if demo.kind == "hit":
+            assert demo.states[-1] == demo.states[-2]
+            assert (demo.states[1:-1] != demo.states[:-2]).all()
+            missed = [
+                c for c in corners if taken == actions[:c] + actions[c - 1 : c] * (len(taken) - c)
+            ]
+            assert missed
+        elif demo.kind in DETOURS:
+            assert demo.states[-1] == maze.goal
+            assert len(taken) >= len(actions) + 4
+            assert all(b != OPPOSITE[a] for a, b in pairwise(taken))
+            assert (demo.states[1:] != demo.states[:-1]).all()
+        else:
+            assert demo.kind == "opposite"
+            out = len(actions) - 1
+            assert taken[:out] == actions[:out]
+            assert demo.states.tolist() == [*correct.states[:-1], *correct.states[-3::-1]]

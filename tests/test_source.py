@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from replication import source
+from replication.paths import PROJECT
+
+MODULES = {
+    "__init__": "",
+    "top": '''
+"""About the top."""
+
+from __future__ import annotations
+
+from toy.middle import twice
+
+
+def four() -> int:
+    """Return four."""
+    return twice(2)  # a comment
+''',
+    "middle": "import toy.bottom\n\n\ndef twice(x):\n    return toy.bottom.FACTOR * x\n",
+    "bottom": "FACTOR = 2\n",
+    "other": "X = 1\n",
+}
+
+
+@pytest.fixture
+def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+    """Return a function that edits a toy package and returns the hash of its top module."""
+    folder = tmp_path / "toy"
+    folder.mkdir()
+    for name, text in MODULES.items():
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(source, "PACKAGE", "toy")
+
+    def hashed(name: str = "top", old: str = "", new: str = "") -> str:
+        text = MODULES[name]
+        assert old in text
+        (folder / f"{name}.py").write_text(text.replace(old, new) if old else text)
+        importlib.invalidate_caches()
+        found = source.source_hash.__wrapped__("toy.top")
+        (folder / f"{name}.py").write_text(text)
+        return found
+
+    yield hashed
+    for name in [name for name in sys.modules if name.split(".")[0] == "toy"]:
+        del sys.modules[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("top", '"""About the top."""', '"""Said otherwise."""'),
+        ("top", '"""About the top."""', ""),
+        ("top", '"""Return four."""', '"""Return 4.\n\n    At length.\n    """'),
+        ("top", "  # a comment", ""),
+        ("top", "return twice(2)", "return twice(\n        2,\n    )"),
+        ("bottom", "FACTOR = 2", "# why\nFACTOR = (2)\n'''A factor.'''"),
+        ("other", "X = 1", "X = 2"),
+    ],
+)
+def test_prose_and_layout_do_not_count(
+    name: str, old: str, new: str, toy: Callable[..., str]
+) -> None:
+    """Docstrings, comments, layout, and modules that are not imported leave the hash alone."""
+    assert toy(name, old, new) == toy()
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("top", "twice(2)", "twice(3)"),
+        ("top", "def four", "def cuatro"),
+        ("middle", "* x", "+ x"),
+        ("bottom", "FACTOR = 2", "FACTOR = 3"),
+        ("bottom", "FACTOR = 2", "FACTOR = 2.0"),
+        ("bottom", "FACTOR = 2", "FACTOR = '2'"),
+        ("middle", "import toy.bottom\n", "import toy.bottom\nimport toy.other\n"),
+    ],
+)
+def test_code_counts(name: str, old: str, new: str, toy: Callable[..., str]) -> None:
+    """An edit of code in a module that is imported, directly or not, changes the hash."""
+    assert toy(name, old, new) != toy()
+
+
+def test_imports_within_functions_count(toy: Callable[..., str]) -> None:
+    """A module that is imported late is one that computes."""
+    late = "def four() -> int:\n    from toy import other"
+    assert toy("top", "def four() -> int:", late) != toy(
+        "top", "def four() -> int:", late.replace("other", "__init__")
+    )
+
+
+def test_a_text_that_is_a_value_counts(toy: Callable[..., str]) -> None:
+    """Only a text that stands alone is prose."""
+    assert toy("bottom", "FACTOR = 2", "FACTOR = 'a'") != toy(
+        "bottom", "FACTOR = 2", "FACTOR = 'b'"
+    )
+
+
+@pytest.fixture
+def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """Return the names of the modules that are read for the hash of `replication.trials`."""
+    read: set[str] = set()
+    whole = Path.read_bytes
+
+    def noted(self: Path) -> bytes:
+        read.add(self.relative_to(PROJECT).with_suffix("").as_posix().replace("/", "."))
+        return whole(self)
+
+    monkeypatch.setattr(Path, "read_bytes", noted)
+    source.source_hash.__wrapped__("replication.trials")
+    return read
+
+
+def test_drawing_and_reporting_do_not_count(hashed_files: set[str]) -> None:
+    """A trial's hash covers what computes it, and neither figures nor tables nor the program."""
+    for name in ("trials", "setting", "qlearning", "expectations", "irl.loop", "irl.unified"):
+        assert f"replication.{name}" in hashed_files
+    for name in ("figures", "panels", "tables", "outputs", "statistics", "regenerate", "cli"):
+        assert (PROJECT / "replication" / f"{name}.py").exists()
+        assert f"replication.{name}" not in hashed_files
+
+
+def test_hash_covers_all_that_python_loads(hashed_files: set[str]) -> None:
+    """Each module of the package that Python loads for `replication.trials` is in the hash."""
+    program = f"""
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location("replication", {str(PROJECT / "replication" / "__init__.py")!r})
+sys.modules["replication"] = module_from_spec(spec)  # its own imports are not executed
+import replication.trials
+loaded = [name for name in sys.modules if name.startswith("replication.")]
+print(*(name for name in loaded if not hasattr(sys.modules[name], "__path__")))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    loaded = set(done.stdout.split())
+    assert "replication.irl.loop" in loaded
+    assert loaded <= hashed_files
+
+
+def test_no_module_hides_its_imports() -> None:
+    """The hash does not follow relative imports, so the package has none."""
+    modules = list((PROJECT / "replication").rglob("*.py"))
+    assert len(modules) > 20
+    for path in modules:
+        assert "from ." not in path.read_text(encoding="utf-8"), path.name
+
+
+def test_hash_is_the_same_again() -> None:
+    """The hash does not depend on the order in which modules are found."""
+    again = source.source_hash.__wrapped__("replication.trials")
+    assert again == source.source_hash("replication.trials")
+    assert len(again) == 64

@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from replication.irl import Snapshots, Trial
+from replication.store import Store
+
+FLOATS = st.floats(width=64)
+
+# What the child processes below share: batch b holds the keys b/0 ... b/49.
+CHILD = """
+import os, sys
+import numpy as np
+from replication.irl import Trial
+from replication.store import Store
+
+def batch(b, value):
+    table, few = np.full((100, 4), float(value)), np.arange(2)
+    trial = Trial(table[0], True, value, table, table, few, few[:1])
+    return [(f"{b}/{k}", trial) for k in range(50)]
+
+store = Store(sys.argv[1])
+"""
+
+
+def trial(numbers: list[float], moves: int, *, kept: list[int] | None = None) -> Trial:
+    """Make a trial of 2 states and 2 actions from any numbers; `kept` has lengths of snapshots."""
+    table = np.resize(np.array(numbers, dtype=np.float64), (2, 2))
+    snapshots = None
+    if kept is not None:
+        snapshots = Snapshots(
+            weights=np.stack([table * k for k in range(len(kept))]),
+            q=np.stack([table - k for k in range(len(kept))]),
+            states=tuple(np.arange(n + 1) for n in kept),
+            actions=tuple(np.arange(n) % 4 for n in kept),
+        )
+    return Trial(
+        errors=np.array(numbers),
+        converged=moves % 2 == 0,
+        steps=moves * 10**12,
+        weights=table,
+        q=-table,
+        states=np.arange(moves + 1),
+        actions=np.arange(moves),
+        snapshots=snapshots,
+    )
+
+
+def assert_same(one: Trial, other: Trial) -> None:
+    """Assert that two trials have the same bits, shapes and types."""
+    assert (one.converged, one.steps) == (other.converged, other.steps)
+    assert (type(one.converged), type(one.steps)) == (bool, int)
+    pairs = [
+        (getattr(one, name), getattr(other, name))
+        for name in ("errors", "weights", "q", "states", "actions")
+    ]
+    assert (one.snapshots is None) == (other.snapshots is None)
+    if one.snapshots is not None and other.snapshots is not None:
+        pairs += [
+            (one.snapshots.weights, other.snapshots.weights),
+            (one.snapshots.q, other.snapshots.q),
+            *zip(one.snapshots.states, other.snapshots.states, strict=True),
+            *zip(one.snapshots.actions, other.snapshots.actions, strict=True),
+        ]
+    for a, b in pairs:
+        assert (a.shape, a.dtype) == (b.shape, b.dtype)
+        assert a.tobytes() == b.tobytes()
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """Return one store for many examples."""
+    return Store(tmp_path_factory.mktemp("store") / "trials.sqlite")
+
+
+@given(
+    numbers=st.lists(FLOATS, min_size=1, max_size=5),
+    moves=st.integers(0, 9),
+    kept=st.none() | st.lists(st.integers(0, 6), min_size=1, max_size=5),
+)
+@settings(max_examples=60, deadline=None)
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_round_trip(
+    shared: Store, numbers: list[float], moves: int, kept: list[int] | None
+) -> None:
+    """What is stored comes back bit for bit, NaN and negative zero included."""
+    stored = trial(numbers, moves, kept=kept)
+    key = repr((numbers, moves, kept))
+    shared.put([(key, stored)])
+    assert_same(shared.get(key, snapshots=True), stored)
+    assert_same(shared.get(key), replace(stored, snapshots=None))
+
+
+def test_keys(store_path: Path) -> None:
+    """A key that was never stored is a KeyError, is not in the store and is not known."""
+    store = Store(store_path)
+    with pytest.raises(KeyError, match="absent"):
+        store.get("absent")
+    store.put([("a", trial([1.0], 1)), ("b", trial([2.0], 2))])
+    assert "a" in store
+    assert "absent" not in store
+    assert store.known(["a", "absent", "b"]) == {"a", "b"}
+    assert store.known([]) == set()
+    assert Store(store_path).get("b").errors.tolist() == [2.0]
+
+
+def test_what_is_stored_never_changes(store_path: Path) -> None:
+    """A second trial under a key is dropped, and the others of its batch are stored."""
+    store = Store(store_path)
+    store.put([("a", trial([1.0], 1))])
+    store.put([("a", trial([9.0], 1)), ("b", trial([2.0], 1))])
+    assert [store.get(key).errors.tolist() for key in "ab"] == [[1.0], [2.0]]
+
+
+def test_a_batch_that_fails_half_way_stores_nothing(store_path: Path) -> None:
+    """Whether a trial cannot be computed or a row not be written, its whole batch is left out."""
+    store = Store(store_path)
+
+    def broken() -> Iterator[tuple[str, Trial]]:
+        yield "a", trial([1.0], 1)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        store.put(broken())
+    with pytest.raises(sqlite3.Error):
+        store.put([("a", trial([1.0], 1)), (object(), trial([1.0], 1))])  # type: ignore[list-item]
+    assert "a" not in store
+    store.put([("a", trial([1.0], 1))])
+    assert "a" in store
+
+
+def test_other_threads_may_read_and_write(store_path: Path) -> None:
+    """Stores that threads open and fill at the same time lose nothing."""
+    keys = [f"{k}" for k in range(40)]
+
+    def write(some: list[str]) -> None:
+        store = Store(store_path)
+        for key in some:
+            store.put([(key, trial([float(key)], 1))])
+
+    threads = [threading.Thread(target=write, args=(keys[k::4],)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert Store(store_path).known(keys) == set(keys)
+
+
+def child(program: str, path: Path) -> subprocess.Popen[str]:
+    """Start another process on the store."""
+    return subprocess.Popen(
+        [sys.executable, "-c", CHILD + program, str(path)], stdout=subprocess.PIPE, text=True
+    )
+
+
+def stored_batches(path: Path, n: int) -> list[int]:
+    """Count the stored trials of batches 0 ... n - 1, reading each of them."""
+    store = Store(path)
+    batches = [store.known(f"{b}/{k}" for k in range(50)) for b in range(n)]
+    for key in set().union(*batches):
+        assert store.get(key).weights.shape == (100, 4)
+    return [len(batch) for batch in batches]
+
+
+def test_a_process_that_ends_within_a_write(store_path: Path) -> None:
+    """A process that ends after it wrote rows, but before the batch is committed, leaves none."""
+    program = """
+store.put(batch(0, 0))
+class Fatal(str):
+    def __conform__(self, protocol):
+        os._exit(7)
+rows = batch(1, 1)
+store.put([*rows[:30], (Fatal("x"), rows[0][1]), *rows[30:]])
+"""
+    with child(program, store_path) as process:
+        assert process.wait() == 7
+    assert stored_batches(store_path, 2) == [50, 0]
+    store = Store(store_path)
+    store.put([("1/0", store.get("0/0"))])
+    assert "1/0" in store
+
+
+def test_a_killed_process_leaves_whole_batches(store_path: Path) -> None:
+    """After a kill in the middle of writes, each batch is there in full or not at all."""
+    with child(
+        "for b in range(10000): store.put(batch(b, b)); print(b, flush=True)", store_path
+    ) as p:
+        assert p.stdout is not None
+        done = [int(p.stdout.readline()) for _ in range(5)]
+        p.send_signal(signal.SIGKILL)
+        done += [int(line) for line in p.stdout if line.endswith("\n")]
+    assert p.returncode == -signal.SIGKILL
+    counts = stored_batches(store_path, len(done) + 2)
+    assert done == list(range(len(done)))
+    assert counts[: len(done)] == [50] * len(done)
+    assert counts[len(done)] in (0, 50)
+    assert counts[len(done) + 1] == 0
+
+
+def test_two_processes_write_at_once(store_path: Path) -> None:
+    """Two processes that fill one store with the same keys both succeed and mix nothing up."""
+    program = "for b in range(20): store.put(batch(b, {}))"
+    processes = [child(program.format(value), store_path) for value in (1, 2)]
+    for process in processes:
+        with process:
+            pass
+        assert process.returncode == 0
+    assert stored_batches(store_path, 20) == [50] * 20
+    store = Store(store_path)
+    for b in range(20):
+        steps = {store.get(f"{b}/{k}").steps for k in range(50)}
+        assert steps in ({1}, {2})
