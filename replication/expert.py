@@ -122,15 +122,13 @@ def _states(maze: Maze, actions: list[int]) -> np.ndarray:
     return np.array(states)
 
 
-def _miss(maze: Maze, correct: list[int], corner: int) -> list[int] | None:
-    """Drive straight on at the corner until a move changes nothing; None if the goal is there."""
+def _miss(maze: Maze, correct: list[int], corner: int) -> list[int]:
+    """Drive straight on at the corner until a move changes nothing."""
     actions = correct[:corner]
     state = int(_states(maze, actions)[-1])
     while True:
         actions = [*actions, correct[corner - 1]]
         there = int(maze.next_state[state, actions[-1]])
-        if there == maze.goal:
-            return None
         if there == state:
             return actions
         state = there

@@ -204,6 +204,7 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     """Draw the iterations of every trial (Figs. 6 and 9), one row for each title.
 
     Beside each row stand the distributions, with our mean (dot) and the paper's (open triangle).
+    That Fig. 9 shows this, and not errors, is the choice FIG9-AXES.
     """
     figure, grid = _figure(
         len(panels), 2, height=0.7 + 2.0 * len(panels), width_ratios=(4, 1), sharey=True

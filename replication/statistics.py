@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 CONFIDENCE = 0.95
+ALPHA = 0.05
 RESAMPLES = 9999
 BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
 
@@ -166,7 +167,7 @@ def verdict_steadier(comparison: Comparison) -> str:
     """
     if np.isnan(comparison.p_spread):
         return NOT_TESTABLE
-    if comparison.p_spread >= 1 - CONFIDENCE:
+    if comparison.p_spread >= ALPHA:
         return NOT_REPRODUCED
     return REPRODUCED if comparison.sd_ratio < 1 else REVERSED
 

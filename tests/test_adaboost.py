@@ -10,7 +10,8 @@ from replication.choices import register
 from replication.irl import adaboost
 from replication.params import Update
 
-RULES = [register()["ADABOOST-RULE"].default, *register()["ADABOOST-RULE"].alternatives]
+ENTRY = register()["ADABOOST-RULE"]
+RULES = [str(rule) for rule in (ENTRY.default, *ENTRY.alternatives)]
 NONE = np.zeros((1, 4), dtype=bool)
 
 

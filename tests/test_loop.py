@@ -39,7 +39,7 @@ class Corridor:
         self, q: Array, stream: NDArray[np.uint64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
         """Follow the greedy policy for at most 30 steps."""
-        states, actions = [0], []
+        states, actions = [0], list[int]()
         while states[-1] != 4 and len(actions) < 30:
             actions.append(int(np.argmax(q[states[-1], ::-1]) == 0))  # ties go left
             states.append(int(NEXT[states[-1], actions[-1]]))

@@ -1,8 +1,8 @@
 """Mazes drawn as text: one table of moves, and a Gymnasium environment on top of it.
 
 A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
-edge of the map is a wall that is not drawn. A move into an obstacle or off the map stays in place.
-The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the compiled learner
+edge of the map is a wall that is not drawn (choice WALLS). A move into an obstacle or off the map
+stays in place. The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the compiled learner
 both read it, so they cannot disagree.
 """
 
