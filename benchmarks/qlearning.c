@@ -16,7 +16,7 @@ typedef struct {
     int64_t states, start, goal, episodes, horizon;
     double beta, gamma;
     uint64_t threshold; /* explore if the high half of the draw is below this */
-    int64_t random_ties, bootstrap_goal;
+    int64_t random_ties;
 } task;
 
 static inline uint64_t rotate(uint64_t word, int bits) {
@@ -79,8 +79,7 @@ void learn(const task *k, int64_t trials, const int64_t *restrict next_state,
                 const int64_t action = choose(row, draw(s), k->threshold, k->random_ties);
                 const int64_t next = next_state[state * ACTIONS + action];
                 const int goal = next == k->goal;
-                const double value =
-                    goal && !k->bootstrap_goal ? 0.0 : best_of(table + next * ACTIONS);
+                const double value = goal ? 0.0 : best_of(table + next * ACTIONS);
                 const double target = w[state * ACTIONS + action] + k->gamma * value;
                 row[action] += k->beta * (target - row[action]);
                 taken++;

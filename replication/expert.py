@@ -100,7 +100,8 @@ def incorrect_demos(maze: Maze, correct: list[int], *, params: Expert) -> Iterat
         "near-detour": 1,
         "far-detour": max(maze.shape),
     }
-    found = {"hit": [_miss(maze, correct, corner) for corner in corners]}
+    found: dict[str, list[list[int] | None]] = {}
+    found["hit"] = [_miss(maze, correct, corner) for corner in corners]
     for kind, width in widths.items():
         found[kind] = [_detour(maze, correct, corner, width) for corner in corners]
     back = [OPPOSITE[action] for action in reversed(correct[:-1])]

@@ -12,8 +12,10 @@ All of it stands in one file because numba renews its cache on disk only when th
 function changes: a compiled function must not call what is compiled from another file.
 """
 
-# Numba infers the types of compiled functions, and llvmlite has none.
+# Numba infers the types of compiled functions and hands an intrinsic its first argument; llvmlite
+# has no types.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, import-untyped"
+# mypy: disable-error-code="call-arg, var-annotated"
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -228,9 +230,9 @@ def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector])
     s0, s1, s2, s3, state, time, left, *row = lanes
     builder, actions = state.builder, len(row)
 
-    def values(of: _Vector) -> list[_Vector]:
+    def addresses(of: _Vector) -> list[_Vector]:
         at = tables + of * (16 * actions)
-        return [(at + 8 * a).load(FLOAT) for a in range(actions)]
+        return [at + 8 * a for a in range(actions)]
 
     word, t = (s0 + s3).rotate(23) + s0, s1 << 17
     s2, s3 = s2 ^ s0, s3 ^ s1
@@ -254,18 +256,23 @@ def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector])
 
     time = time + 1
     at_goal, late = successor.compare("==", rule.goal), time.compare("==", rule.horizon)
-    done = at_goal | late
-    follow = done.select(rule.start, successor)
-    row = values(follow)
-    # Only a time-out needs the row of the state it ends in as well as that of the start.
-    value = cgutils.alloca_once_value(builder, _largest(row).value)
-    with builder.if_then(late.any(), likely=False):
-        builder.store(_largest(values(successor)).value, value)
-    value = at_goal.select(0.0, _Vector(builder, builder.load(value)))
+    follow = at_goal.select(rule.start, successor)
+    places = addresses(follow)
+    row = [x.load(FLOAT) for x in places]
+    value = at_goal.select(0.0, _largest(row))
     new = old + rule.beta * (reward + rule.gamma * value - old)
     at.store(new)
-    again = follow.compare("==", state)
-    row = [(again & action.compare("==", a)).select(new, row[a]) for a in range(actions)]
+    # The row was read before the store, which may have been to one of its places.
+    row = [x.compare("==", at).select(new, value) for x, value in zip(places, row, strict=True)]
+    # After a time-out the next state is not the one whose value is in the target. This branch comes
+    # last: LLVM would move a gather from before it to behind it, which costs a fifth of the speed.
+    follow = late.select(rule.start, follow)
+    variables = [cgutils.alloca_once_value(builder, x.value) for x in row]
+    with builder.if_then(late.any(), likely=False):
+        for x, variable in zip(addresses(follow), variables, strict=True):
+            builder.store(x.load(FLOAT).value, variable)
+    row = [_Vector(builder, builder.load(x)) for x in variables]
+    done = at_goal | late
     return [*stream, follow, done.select(0, time), left - done.count(), *row]
 
 

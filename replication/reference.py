@@ -32,13 +32,12 @@ def learn(
     gamma: float,
     epsilon: float,
     random_ties: bool = True,
-    bootstrap_goal: bool = False,
 ) -> tuple[list[list[float]], list[int], int]:
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
 
-    An episode ends on reaching ``goal``, whose value is 0 unless ``bootstrap_goal``, or after
-    ``horizon`` steps; such a time-out is not terminal, so its target bootstraps as any other.
-    Returns the new Q, the stream after the last draw, and the number of steps.
+    An episode ends on reaching ``goal``, which is worth 0 (choice GOAL-VALUE), or after ``horizon``
+    steps; such a time-out is not terminal, so its target bootstraps as any other. Returns the new
+    Q, the stream after the last draw, and the number of steps.
 
     Examples
     --------
@@ -66,7 +65,7 @@ def learn(
         for _ in range(horizon):
             action = choose(q[state], draw(stream), epsilon, random_ties)
             successor = next_state[state][action]
-            value = max(q[successor]) if successor != goal or bootstrap_goal else 0.0
+            value = max(q[successor]) if successor != goal else 0.0
             target = weights[state][action] + gamma * value
             q[state][action] += beta * (target - q[state][action])
             steps += 1

@@ -56,13 +56,12 @@ def assert_like_reference(
 
 
 @pytest.mark.parametrize("random_ties", [True, False])
-@pytest.mark.parametrize("bootstrap_goal", [True, False])
 @pytest.mark.parametrize(
     ("next_state", "trials"),
     [(grid(4, 4), 1), (grid(5, 3, (4, 7)), 3), (grid(1, 9), 25), (grid(6, 6, (8, 9, 20)), 40)],
 )
 def test_learn_equals_the_reference_in_mazes(
-    next_state: Array, trials: int, random_ties: bool, bootstrap_goal: bool
+    next_state: Array, trials: int, random_ties: bool
 ) -> None:
     """Every trial of a maze has the reference's bits, whatever the number of trials."""
     rng = np.random.default_rng(trials)
@@ -83,7 +82,6 @@ def test_learn_equals_the_reference_in_mazes(
         gamma=0.9,
         epsilon=0.1,
         random_ties=random_ties,
-        bootstrap_goal=bootstrap_goal,
     )
 
 
@@ -109,7 +107,6 @@ def problems(draw: st.DrawFn) -> tuple[tuple[Array, Array, Array, Array], dict[s
         "gamma": draw(rate),
         "epsilon": draw(rate),
         "random_ties": draw(st.booleans()),
-        "bootstrap_goal": draw(st.booleans()),
     }
     streams = make_streams(draw(st.integers(0, 2**32)), trials)
     return (next_state, draw(table), draw(table), streams), options
@@ -208,14 +205,12 @@ def test_worked_example(trials: int) -> None:
 
 @pytest.mark.parametrize("trials", [1, 12])
 @pytest.mark.parametrize(
-    ("goal", "bootstrap_goal", "expected"),
-    [(0, False, 6.0), (1, False, 1.0), (1, True, 6.0)],
-    ids=["time-out", "goal", "goal bootstrapped"],
+    ("goal", "expected"),
+    [(0, 6.0), (1, 1.0)],
+    ids=["time-out", "goal"],
 )
-def test_only_the_goal_is_terminal(
-    goal: int, bootstrap_goal: bool, expected: float, trials: int
-) -> None:
-    """A time-out bootstraps from the state it ends in; the goal does so only on demand."""
+def test_only_the_goal_is_terminal(goal: int, expected: float, trials: int) -> None:
+    """A time-out bootstraps from the state it ends in; the goal is worth 0 whatever its Q."""
     q = np.zeros((trials, 2, 1))
     q[:, 1] = 10.0
     values, _, _ = qlearning.learn(
@@ -230,20 +225,8 @@ def test_only_the_goal_is_terminal(
         beta=1.0,
         gamma=0.5,
         epsilon=0.0,
-        bootstrap_goal=bootstrap_goal,
     )
     assert values[:, :, 0].tolist() == [[expected, 10.0]] * trials
-
-
-def test_bootstrapping_at_a_goal_of_value_0_changes_nothing(
-    batch: tuple[Array, Array, Array],
-) -> None:
-    """Nobody acts at the goal, so if Q starts at 0 there, both goal rules are the same."""
-    weights, q, streams = batch
-    q[:, LEARN["goal"]] = 0.0
-    plain = qlearning.learn(grid(5, 5), weights, q, streams, **LEARN)
-    bootstrapped = qlearning.learn(grid(5, 5), weights, q, streams, **LEARN, bootstrap_goal=True)
-    assert all(same_bits(a, b) for a, b in zip(plain, bootstrapped, strict=True))
 
 
 @pytest.mark.parametrize(("goal", "length"), [(3, 3), (0, 7)], ids=["goal", "time-out"])
@@ -365,10 +348,16 @@ def test_stream_is_never_all_zero() -> None:
         ({"streams": np.ones((21, 4))}, "streams must be uint64"),
         ({"streams": np.ones((21, 3), np.uint64)}, "streams must be uint64"),
         ({"streams": np.zeros((21, 4), np.uint64)}, "streams must not be all zero"),
-        ({"start": 25}, "start must hold states from 0 to 24"),
-        ({"goal": -1}, "goal must hold states from 0 to 24"),
-        ({"episodes": 0}, "episodes must be positive"),
-        ({"horizon": 0}, "horizon must be positive"),
+        ({"start": 25}, "start must be an integer from 0 to 24, not 25"),
+        ({"start": 1.0}, "start must be an integer"),
+        ({"goal": -1}, "goal must be an integer"),
+        ({"goal": True}, "goal must be an integer"),
+        ({"goal": np.True_}, "goal must be an integer"),
+        ({"episodes": 0}, "episodes must be an integer from 1"),
+        ({"episodes": 2.5}, "episodes must be an integer from 1"),
+        ({"episodes": 2**31}, "episodes must be an integer from 1"),
+        ({"horizon": 0}, "horizon must be an integer from 1"),
+        ({"horizon": np.float64(50)}, "horizon must be an integer from 1"),
         ({"beta": 1.5}, "beta must be in"),
         ({"gamma": -0.1}, "gamma must be in"),
         ({"epsilon": np.nan}, "epsilon must be in"),
