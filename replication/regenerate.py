@@ -160,7 +160,7 @@ def run_notebooks(
         seconds = time.perf_counter() - began
         number = "1 output" if len(notebook.outputs) == 1 else f"{len(notebook.outputs)} outputs"
         echo(f"{notebook.name}: {number} in {seconds:.1f} s")
-    return published
+    return list(dict.fromkeys(published))
 
 
 def _check_apart(notebooks: Sequence[Notebook]) -> None:

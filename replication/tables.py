@@ -247,16 +247,18 @@ def findings(table: pd.DataFrame) -> str:
             numbers = f"difference {_interval(row.difference, row.low, row.high)}"
             if not np.isnan(row.paper_difference):
                 numbers += f", in the paper {row.paper_difference:.2f}"
+        numbers += f"; p {_p(row.p)}, after Holm {_p(row.p_holm)}"
         lines.append(f"- **{row.verdict}** with {F_LABELS[row.F]}: {row.claim} ({numbers}).\n")
     return "".join(lines)
 
 
 def markdown(table: pd.DataFrame) -> str:
-    """Return a table as Markdown."""
-    head = "| " + " | ".join(map(str, table.columns)) + " |"
-    rule = "|" + " --- |" * len(table.columns)
-    lines = ["| " + " | ".join(map(str, row)) + " |" for row in table.itertuples(index=False)]
-    return "\n".join([head, rule, *lines]) + "\n"
+    """Return a table as Markdown, with columns that line up as text, too."""
+    rows = [list(map(str, row)) for row in (table.columns, *table.itertuples(index=False))]
+    widths = [max(3, *map(len, column)) for column in zip(*rows, strict=True)]
+    rows.insert(1, ["-" * width for width in widths])
+    lines = (" | ".join(map(str.ljust, row, widths)) for row in rows)
+    return "".join(f"| {line} |\n" for line in lines)
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> Path:

@@ -3,7 +3,9 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from pathlib import Path
 
+from replication import check_demos, fit, load_demos
 from replication.paths import PROJECT
 
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
@@ -28,3 +30,15 @@ def test_make_targets_that_are_named_exist() -> None:
     named = set(re.findall(r"make ([a-z]+)\b", README)) - {"and"}
     makefile = (PROJECT / "Makefile").read_text(encoding="utf-8")
     assert named <= set(re.findall(r"^([a-z]+):", makefile, flags=re.MULTILINE))
+
+
+def test_example_demonstration_can_be_learned(tmp_path: Path) -> None:
+    """The JSON example loads without a warning and both Python lines do what they say."""
+    example = re.search(r"```json\n(.*?)```", README, flags=re.DOTALL)
+    assert example is not None
+    path = tmp_path / "mine.json"
+    path.write_text(example[1], encoding="utf-8")
+    assert check_demos(path) == []
+    result = fit(load_demos(path), method="unified-incorrect", seed=1)
+    assert result.converged
+    result.save(tmp_path / "result.json")

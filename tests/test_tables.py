@@ -168,9 +168,9 @@ def test_readable_tables_have_a_row_for_each_row(
 
 
 def test_markdown_is_a_table() -> None:
-    """Columns become the head, rows become lines."""
-    assert markdown(pd.DataFrame({"a": [1, 2], "b": ["x", "y"]})) == (
-        "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | y |\n"
+    """Columns become the head, rows become lines, and the cells line up."""
+    assert markdown(pd.DataFrame({"a": [1, 2], "b": ["x", "long"]})) == (
+        "| a   | b    |\n| --- | ---- |\n| 1   | x    |\n| 2   | long |\n"
     )
 
 
