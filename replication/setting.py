@@ -42,8 +42,7 @@ class Setting:
     params: Params
 
     def __post_init__(self) -> None:
-        get_method(self.method)
-        self.demos.select(self.params.demonstrations.incorrect)
+        _ = self.selected  # a setting that cannot run is refused when it is made
 
     @cached_property
     def selected(self) -> Demos:

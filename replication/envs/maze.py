@@ -2,8 +2,8 @@
 
 A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
 edge of the map is a wall that is not drawn (choice WALLS). A move into an obstacle or off the map
-stays in place. The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the compiled learner
-both read it, so they cannot disagree.
+stays in place. The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the
+compiled learner both read it, so they cannot disagree.
 """
 
 from __future__ import annotations
