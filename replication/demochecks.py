@@ -1,6 +1,6 @@
 """What a demonstration has to be; a refusal is one line that names the place and the mend.
 
-A demonstration is checked by replaying its actions from the start. Rows and columns count from 0.
+A demonstration is checked by replaying its actions from the start. Cells count from 0.
 Steps count from 1: step k takes ``actions[k - 1]`` and leads to ``states[k]``.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.envs.maze import Maze
+from replication.envs.base import Environment
 
 
 class DemoError(ValueError):
@@ -25,7 +25,9 @@ class DemoWarning(UserWarning):
     """Demonstrations that can be used, but which no deterministic policy can match exactly."""
 
 
-def action_numbers(environment: Maze, name: str, actions: Sequence[str]) -> NDArray[np.int64]:
+def action_numbers(
+    environment: Environment, name: str, actions: Sequence[str]
+) -> NDArray[np.int64]:
     """Return the numbers of named actions, int64 [T].
 
     Raises
@@ -44,14 +46,14 @@ def action_numbers(environment: Maze, name: str, actions: Sequence[str]) -> NDAr
 
 
 def replay(
-    environment: Maze, name: str, actions: NDArray[np.int64], claims: list[list[int]] | None
+    environment: Environment, name: str, actions: NDArray[np.int64], claims: list[list[int]] | None
 ) -> NDArray[np.int64]:
     """Return the states [T + 1] that actions [T] visit from the start on.
 
     Raises
     ------
     DemoError
-        If `claims`, a row and column for each state, tells another way.
+        If `claims`, the numbers that stand for each state, tells another way.
     """
     states = environment.replay(actions)
     cells = environment.cells(states).tolist()
@@ -65,7 +67,7 @@ def replay(
                 f"demo {show(name)} begins at {claimed}, but the start is {right}; write {right}"
             )
         action, before = environment.actions[actions[step - 1]], cells[step - 1]
-        outcome = "hits a wall and stays" if due == before else f"leads to {right}"
+        outcome = environment.stay if due == before else f"leads to {right}"
         raise DemoError(
             f"step {step} of demo {show(name)}: {action!r} from {compact(before)} {outcome}, but "
             f"the file claims {claimed}; write {right} or change the action"
@@ -79,7 +81,7 @@ def replay(
 
 
 def check_moves(
-    environment: Maze, name: str, actions: NDArray[np.int64], states: NDArray[np.int64]
+    environment: Environment, name: str, actions: NDArray[np.int64], states: NDArray[np.int64]
 ) -> None:
     """Refuse a demonstration that is empty, leaves the moves, or goes on beyond the goal.
 
@@ -93,11 +95,11 @@ def check_moves(
     if actions.min() < 0 or actions.max() >= environment.n_actions:
         raise DemoError(f"demo {show(name)}: actions must be 0..{environment.n_actions - 1}")
     replay(environment, name, actions, environment.cells(states).tolist())
-    early = np.flatnonzero(states[:-1] == environment.goal)
-    if early.size:
+    end = environment.goal_step(actions)
+    if end is not None and end < actions.size:
         raise DemoError(
-            f"demo {show(name)} goes on after reaching the goal at step {early[0]}; "
-            f"drop the {actions.size - early[0]} steps that follow"
+            f"demo {show(name)} goes on after reaching the goal at step {end}; "
+            f"drop the {actions.size - end} steps that follow"
         )
 
 

@@ -31,7 +31,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from replication.demochecks import DemoError, compact, show, suggest
 from replication.demojson import read_json
+from replication.envs.field import SoccerField
 from replication.envs.maze import MAX_SIDE, Maze, MazeError
+from replication.envs.soccer import SoccerParams
 
 FORMAT = "replication-demos"
 VERSION = 1
@@ -49,8 +51,7 @@ MENDS = {
 # --- what a file holds -----------------------------------------------------------------------
 
 # A kind of environment is a class of fields here, told apart by `kind`, that can `build` the
-# environment and `describe` it, and an environment with `actions`, `goal`, `replay` and `cells`.
-# A second kind turns the field `environment` of DemoFile into a union, discriminated by `kind`.
+# environment; the environment can `describe` itself.
 
 
 class _Fields(BaseModel):
@@ -59,8 +60,11 @@ class _Fields(BaseModel):
 
 _Name = Annotated[str, Field(min_length=1, max_length=100, pattern=NAME)]
 _Cell = Annotated[list[Annotated[int, Field(ge=0, lt=MAX_SIDE)]], Field(min_length=2, max_length=2)]
+_Numbers = Annotated[
+    list[Annotated[int, Field(ge=0, lt=MAX_SIDE)]], Field(min_length=2, max_length=3)
+]  # of a state: row and column in a maze; column, row and detection in soccer
 _Actions = Annotated[list[Annotated[str, Field(max_length=100)]], Field(fail_fast=True)]
-_States = Annotated[list[_Cell], Field(fail_fast=True)]
+_States = Annotated[list[_Numbers], Field(fail_fast=True)]
 
 
 class MazeFields(_Fields):
@@ -80,7 +84,7 @@ class MazeFields(_Fields):
             maze = Maze(tuple(self.map))
         except MazeError as error:
             raise DemoError(f"environment: {error}") from None
-        derived = self.describe(maze)
+        derived = maze.describe()
         for field in ("actions", "start", "goal"):
             given, due = getattr(self, field), derived[field]
             if given is not None and given != due:
@@ -90,16 +94,36 @@ class MazeFields(_Fields):
                 )
         return maze
 
-    @staticmethod
-    def describe(maze: Maze) -> dict[str, Any]:
-        """Fields of an environment, as plain JSON values."""
-        return {
-            "kind": "maze",
-            "map": list(maze.rows),
-            "actions": list(maze.actions),
-            "start": list(maze.cell(maze.start)),
-            "goal": list(maze.cell(maze.goal)),
-        }
+
+class SoccerFields(_Fields):
+    """The soccer field; whatever is left out has its registered default."""
+
+    kind: Literal["soccer"]
+    actions: _Actions | None = None
+    drive_time: float | None = None
+    speed: float | None = None
+    slow_speed: float | None = None
+    turn_rate: float | None = None
+    rays: int | None = None
+    ray_length: float | None = None
+    ray_arc: int | None = None
+    dt: float | None = None
+    macro: str | None = None
+    time_limit: float | None = None
+
+    def build(self) -> SoccerField:
+        """Make the environment; raises `DemoError` if what is given does not agree."""
+        given = self.model_dump(exclude={"kind", "actions"}, exclude_none=True)
+        try:
+            field = SoccerField(SoccerParams(**given))
+        except ValueError as error:
+            raise DemoError(f"environment: {error}") from None
+        if self.actions is not None and tuple(self.actions) != field.actions:
+            raise DemoError(
+                f"environment: 'actions' is {show(self.actions)}, but soccer has "
+                f"{compact(field.actions)}; write that, or leave it out"
+            )
+        return field
 
 
 class CorrectFields(_Fields):
@@ -126,7 +150,7 @@ class DemoFile(_Fields):
     version: Literal[1]
     task: Annotated[str, Field(max_length=100, pattern=TASK)]
     description: Annotated[str, Field(max_length=10_000)] = ""
-    environment: MazeFields
+    environment: Annotated[MazeFields | SoccerFields, Field(discriminator="kind")]
     # That there is at least one is checked by `Demos`, which says it better.
     correct: Annotated[
         list[CorrectFields],
@@ -166,8 +190,8 @@ def read_fields(content: bytes) -> DemoFile:
         raise DemoError(_explain(error, data)) from None
 
 
+_ENVIRONMENTS: dict[str, type[BaseModel]] = {"maze": MazeFields, "soccer": SoccerFields}
 _MODELS: dict[str, type[BaseModel]] = {
-    "environment": MazeFields,
     "correct": CorrectFields,
     "incorrect": IncorrectFields,
 }
@@ -177,10 +201,23 @@ def _explain(error: ValidationError, data: dict[str, Any]) -> str:
     """One line for the first thing that pydantic found."""
     first = error.errors(include_url=False)[0]
     place, kind = first["loc"], first["type"]
+    models = dict(_MODELS)
+    if place[0] == "environment" and len(place) > 1:  # pydantic names the kind as well
+        models["environment"] = _ENVIRONMENTS[str(place[1])]
+        place = ("environment", *place[2:])
+    if kind == "union_tag_not_found":
+        return "environment: the field 'kind' is missing; add it"
+    if kind == "union_tag_invalid":
+        tag = data["environment"]["kind"]
+        known = tuple(_ENVIRONMENTS)
+        return (
+            f"environment.kind: unknown kind {show(tag)}; {suggest(str(tag), known)}"
+            f"the kinds are {', '.join(known)}"
+        )
     if kind == "missing":
         return f"{_where(place[:-1], data)}the field {place[-1]!r} is missing; add it"
     if kind == "extra_forbidden":
-        key, model = str(place[-1]), DemoFile if len(place) == 1 else _MODELS[str(place[0])]
+        key, model = str(place[-1]), DemoFile if len(place) == 1 else models[str(place[0])]
         known = tuple(model.model_fields)
         return (
             f"{_where(place[:-1], data)}unknown field {show(key)}; {suggest(key, known)}"

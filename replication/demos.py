@@ -37,11 +37,11 @@ from replication.demofile import (
     VERSION,
     CorrectFields,
     IncorrectFields,
-    MazeFields,
     json_schema,
     read_fields,
 )
 from replication.demojson import layout, read_content, reason
+from replication.envs.base import Environment
 from replication.envs.maze import Maze
 from replication.files import write_file
 
@@ -122,7 +122,7 @@ class Demos:
     """
 
     task: str
-    environment: Maze
+    environment: Environment
     correct: tuple[Demo, ...]
     incorrect: tuple[Demo, ...] = ()
     description: str = ""
@@ -142,15 +142,14 @@ class Demos:
                 raise DemoError(f"two demos are named {show(demo.name)}; give each its own name")
             names.add(demo.name)
             check_moves(self.environment, demo.name, demo.actions, demo.states)
-        goal = self.environment.goal
         for demo in self.correct:
             if demo.kind != "correct":
                 raise DemoError(f"demo {show(demo.name)} is correct; its kind must be 'correct'")
-            if demo.states[-1] != goal:
-                end, due = (compact(self.environment.cell(s)) for s in (demo.states[-1], goal))
+            if self.environment.goal_step(demo.actions) is None:
+                end = compact(self.environment.cell(int(demo.states[-1])))
                 raise DemoError(
-                    f"demo {show(demo.name)} is correct, but ends at {end}, not at the goal {due}; "
-                    "add the missing steps or move it to 'incorrect'"
+                    f"demo {show(demo.name)} is correct, but ends at {end} and misses "
+                    f"{self.environment.aim}; add the missing steps or move it to 'incorrect'"
                 )
         for demo in self.incorrect:
             if not re.fullmatch(KIND, demo.kind) or demo.kind in RESERVED_KINDS:
@@ -158,6 +157,19 @@ class Demos:
                     f"demo {show(demo.name)} is incorrect, of kind {show(demo.kind)}; "
                     f"{MENDS[KIND]}, but none of {', '.join(RESERVED_KINDS)}"
                 )
+
+    @property
+    def maze(self) -> Maze:
+        """The environment of a task that is a maze.
+
+        Raises
+        ------
+        DemoError
+            If it is of another kind.
+        """
+        if not isinstance(self.environment, Maze):
+            raise DemoError(f"task {self.task} is not a maze")
+        return self.environment
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -259,7 +271,7 @@ def demos_document(demos: Demos) -> dict[str, Any]:
         "version": VERSION,
         "task": demos.task,
         "description": demos.description,
-        "environment": MazeFields.describe(demos.environment),
+        "environment": demos.environment.describe(),
         "correct": [{"name": demo.name} | trajectory(demo) for demo in demos.correct],
         "incorrect": [
             {"name": demo.name, "kind": demo.kind} | trajectory(demo) for demo in demos.incorrect
@@ -293,7 +305,7 @@ def content_hash(demos: Demos) -> str:
     description and the file's layout do not matter.
     """
     seen = {
-        "environment": MazeFields.describe(demos.environment),
+        "environment": demos.environment.describe(),
         "demos": [
             [demo.kind, demo.states.tolist(), demo.actions.tolist()]
             for demo in demos.correct + demos.incorrect
@@ -303,7 +315,7 @@ def content_hash(demos: Demos) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _demo(environment: Maze, kind: str, fields: CorrectFields | IncorrectFields) -> Demo:
+def _demo(environment: Environment, kind: str, fields: CorrectFields | IncorrectFields) -> Demo:
     actions = action_numbers(environment, fields.name, fields.actions)
     states = replay(environment, fields.name, actions, fields.states)
     return Demo(fields.name, kind, states, actions)

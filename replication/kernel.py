@@ -71,7 +71,7 @@ def _draw(stream):
 
 
 @_compiled
-def _choose(actions, row, stream, threshold, random_ties):
+def choose(actions, row, stream, threshold, random_ties):
     """Return the action that `reference.choose` takes."""
     high, low = _draw(stream)
     if high < threshold:
@@ -96,7 +96,7 @@ def _finish(actions, stream, progress, table, successors, rule):
     """Run one trial to its end."""
     state, time = progress[STATE], progress[TIME]
     while progress[LEFT]:
-        action = _choose(actions, table[state, 0], stream, rule.threshold, rule.random_ties)
+        action = choose(actions, table[state, 0], stream, rule.threshold, rule.random_ties)
         successor = successors[state, action]
         value = 0.0
         if successor != rule.goal:
@@ -119,7 +119,7 @@ def follow(actions, stream, values, successors, rule):
     """Roll out the greedy policy of `values` [state, action]; the stream advances in place."""
     states, taken = [rule.start], [0 for _ in range(0)]
     while len(taken) < rule.horizon:
-        action = _choose(actions, values[states[-1]], stream, 0, rule.random_ties)
+        action = choose(actions, values[states[-1]], stream, 0, rule.random_ties)
         taken.append(action)
         states.append(successors[states[-1], action])
         if states[-1] == rule.goal:

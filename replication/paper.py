@@ -36,5 +36,17 @@ TABLE_2 = {
 FIGURE_5 = {"adaboost": 73, "unified": 47}
 """Iterations after which the errors drawn for the open maze are zero."""
 
+FIGURE_12 = {"unified": 15, "unified-incorrect": 7}
+"""Iterations after which the errors drawn for robot soccer are zero: one curve each."""
+
+SOCCER = {"beta": 0.6, "gamma": 0.9, "epsilon": 0.3, "epsilon_end": 0.05, "episodes": 100}
+"""Learning parameters of section IV-C; see SOCCER-EPISODES for what the episodes are."""
+
+SOCCER_CURVES = {
+    name: Published("Fig. 12", float(iterations), float("nan"), n=1)
+    for name, iterations in FIGURE_12.items()
+}
+"""The same as means of a single trial each."""
+
 MOVES = {"open-maze": 31, "obstacle-maze": 33}
 """Steps of the correct demonstration (sections IV-A and IV-B)."""

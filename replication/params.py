@@ -22,6 +22,13 @@ class Expert(Chosen):
 
 
 @dataclass(frozen=True)
+class SoccerExpert(Chosen):
+    """Where the scripted soccer expert leaves the correct path to show a mistake."""
+
+    leave: str = choice("SOCCER-INCORRECT")
+
+
+@dataclass(frozen=True)
 class Demonstrations(Chosen):
     """Which of a file's incorrect demonstrations are used."""
 
@@ -35,10 +42,12 @@ class Learner(Chosen):
     beta: float = choice("BETA")
     gamma: float = choice("GAMMA")
     epsilon: float = choice("EPSILON")
+    epsilon_end: float = choice("EPSILON-END")
     episodes: int = choice("EPISODES")
     horizon: int = choice("HORIZON")
     q_start: str = choice("Q-START")
     ties: str = choice("TIES")
+    goal_value: str = choice("GOAL-VALUE")
 
 
 @dataclass(frozen=True)

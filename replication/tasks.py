@@ -12,7 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from replication import qlearning
+from replication import qlearning, soccer_learning
+from replication.choices import ChoiceError
+from replication.envs.base import Environment
+from replication.envs.field import SoccerField
 from replication.envs.maze import Maze
 from replication.params import Learner, Params
 
@@ -27,6 +30,11 @@ class Task(Protocol):
     @property
     def shape(self) -> tuple[int, int]:
         """Number of states and number of actions."""
+        ...
+
+    @property
+    def together(self) -> int:
+        """How many trials are best learned in one call."""
         ...
 
     def learn(
@@ -51,6 +59,14 @@ class MazeTask:
     maze: Maze
     learner: Learner
     rollout_ties: str
+    together: int = 25  # enough to keep the compiled learner's lanes busy
+
+    def __post_init__(self) -> None:
+        if self.learner.epsilon_end != self.learner.epsilon:
+            raise ChoiceError(
+                "in mazes the exploration probability does not change: "
+                f"set epsilon_end = {self.learner.epsilon} as well"
+            )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -89,6 +105,57 @@ class MazeTask:
         )
 
 
-def make_task(environment: Maze, params: Params) -> Task:
-    """Return the task that the demonstrations of `environment` belong to."""
-    return MazeTask(environment, params.learner, params.loop.rollout_ties)
+@dataclass(frozen=True)
+class SoccerTask:
+    """Q-learning (Eq. 1) and greedy episodes in robot soccer; its own time limit is the horizon."""
+
+    field: SoccerField
+    learner: Learner
+    rollout_ties: str
+    together: int = 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of states and number of actions."""
+        return self.field.n_states, self.field.n_actions
+
+    def learn(
+        self, weights: Array, q: Array, streams: Streams
+    ) -> tuple[Array, Streams, NDArray[np.int64]]:
+        """Learn by Q-learning, see :func:`replication.soccer_learning.learn_trial`."""
+        learned = [
+            soccer_learning.learn_trial(
+                self.field.params,
+                *one,
+                episodes=self.learner.episodes,
+                beta=self.learner.beta,
+                gamma=self.learner.gamma,
+                epsilon_start=self.learner.epsilon,
+                epsilon_end=self.learner.epsilon_end,
+                random_ties=self.learner.ties == "random",
+                bootstrap_goal=self.learner.goal_value == "bootstrap",
+            )
+            for one in zip(weights, q, streams, strict=True)
+        ]
+        tables, words, steps = zip(*learned, strict=True)
+        return np.array(tables), np.array(words), np.array(steps)
+
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
+        """Follow the greedy policy, see :func:`replication.soccer_learning.roll_out`."""
+        ties = self.rollout_ties == "random"
+        return soccer_learning.roll_out(self.field.params, q, stream, random_ties=ties)
+
+
+def make_task(environment: Environment, params: Params) -> Task:
+    """Return the task that the demonstrations of `environment` belong to.
+
+    Raises
+    ------
+    ChoiceError
+        If there is no task for such an environment, or it cannot do what the parameters ask for.
+    """
+    if isinstance(environment, Maze):
+        return MazeTask(environment, params.learner, params.loop.rollout_ties)
+    if isinstance(environment, SoccerField):
+        return SoccerTask(environment, params.learner, params.loop.rollout_ties)
+    raise ChoiceError(f"there is no task for a {type(environment).__name__}")

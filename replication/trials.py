@@ -30,9 +30,6 @@ from replication.store import Store
 TRACED_TRIAL = 0
 """The one trial of a setting that keeps every iteration, declared beforehand (FIG5-TRIAL)."""
 
-CHUNK = 25
-"""Trials that one worker computes together; wide enough to keep the learner's lanes busy."""
-
 
 class Results:
     """The trials of some settings, read from the store when they are asked for."""
@@ -111,8 +108,9 @@ def run_trials(
         keys = {k: trial_key(setting, seed, k) for k in range(trials)}
         known = store.known(keys.values())
         missing = [k for k, key in keys.items() if key not in known]
-        for at in range(0, len(missing), CHUNK):
-            chunks.append((setting, missing[at : at + CHUNK]))
+        size = setting.task.together
+        for at in range(0, len(missing), size):
+            chunks.append((setting, missing[at : at + size]))
     work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(
         joblib.delayed(_compute)(setting, ks, seed) for setting, ks in chunks
     )

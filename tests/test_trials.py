@@ -12,7 +12,7 @@ from replication.params import Params
 from replication.seeds import trial_seeds
 from replication.setting import Setting
 from replication.store import Store
-from replication.trials import CHUNK, TRACED_TRIAL, Results, run_trials, trial_key
+from replication.trials import TRACED_TRIAL, Results, run_trials, trial_key
 
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
 
@@ -41,8 +41,8 @@ def _bits(results: Results) -> list[bytes]:
 @pytest.mark.parametrize("jobs", [2, 4])
 def test_workers_do_not_change_a_bit(small_demos: Demos, tmp_path: Path, jobs: int) -> None:
     """One, two and four workers give the same bits."""
-    alone = _run(small_demos, tmp_path / "one.sqlite", trials=CHUNK + 3)
-    shared = _run(small_demos, tmp_path / "many.sqlite", jobs=jobs, trials=CHUNK + 3)
+    alone = _run(small_demos, tmp_path / "one.sqlite", trials=28)
+    shared = _run(small_demos, tmp_path / "many.sqlite", jobs=jobs, trials=28)
     assert _bits(alone) == _bits(shared)
 
 

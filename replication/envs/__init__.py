@@ -1,6 +1,7 @@
-"""Environments: tabular worlds that feed both Gymnasium and the compiled learner.
+"""Environments that feed both Gymnasium and the compiled learners.
 
-Importing this package registers ``replication/Maze-v0`` with Gymnasium.
+Importing this package registers ``replication/Maze-v0`` and ``replication/Soccer-v0`` with
+Gymnasium.
 """
 
 import gymnasium
@@ -14,3 +15,4 @@ gymnasium.register(
     entry_point="replication.envs.maze:MazeEnv",
     max_episode_steps=500,
 )
+gymnasium.register(id="replication/Soccer-v0", entry_point="replication.envs.soccer_env:SoccerEnv")

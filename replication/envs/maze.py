@@ -2,8 +2,8 @@
 
 A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
 edge of the map is a wall that is not drawn (choice WALLS). A move into an obstacle or off the map
-stays in place. The table `Maze.next_state` is all there is to the dynamics: `MazeEnv` and the
-compiled learner both read it, so they cannot disagree.
+stays in place (choice BUMP). The table `Maze.next_state` is all there is to the dynamics: `MazeEnv`
+and the compiled learner both read it, so they cannot disagree.
 """
 
 from __future__ import annotations
@@ -185,6 +185,31 @@ class Maze:
         for action in actions:
             states.append(self.next_state.item(states[-1], action))
         return np.array(states, dtype=np.int64)
+
+    def goal_step(self, actions: Iterable[int]) -> int | None:
+        """After how many of the actions the goal is reached first; None if it is not."""
+        at_goal = np.flatnonzero(self.replay(actions) == self.goal)
+        return int(at_goal[0]) if at_goal.size else None
+
+    @property
+    def aim(self) -> str:
+        """The goal in words."""
+        return f"the goal [{','.join(map(str, self.cell(self.goal)))}]"
+
+    @property
+    def stay(self) -> str:
+        """What a move that changes nothing means."""
+        return "hits a wall and stays"
+
+    def describe(self) -> dict[str, Any]:
+        """Return the maze as plain JSON values."""
+        return {
+            "kind": "maze",
+            "map": list(self.rows),
+            "actions": list(self.actions),
+            "start": list(self.cell(self.start)),
+            "goal": list(self.cell(self.goal)),
+        }
 
     @cached_property
     def _goal_distances(self) -> NDArray[np.int64]:
