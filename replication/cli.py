@@ -78,7 +78,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-demos_app = typer.Typer(help="Check demonstration files.", no_args_is_help=True)
+demos_app = typer.Typer(help="Make and check demonstration files.", no_args_is_help=True)
 app.add_typer(demos_app, name="demos")
 
 Pairs = Annotated[
@@ -107,32 +107,45 @@ def main(
     """Take the options that come before a command."""
 
 
-@app.command(cls=TwoWords)
+@app.command(
+    cls=TwoWords, epilog="Example: replicate run open_maze --profile quick -p set_trials 4"
+)
 def run(
     notebooks: Annotated[
         list[str] | None,
         typer.Argument(metavar="NOTEBOOK", help="Names or paths; all by default."),
     ] = None,
-    profile: Annotated[Profile, typer.Option(help="How much is run.")] = Profile.PAPER,
+    profile: Annotated[
+        Profile, typer.Option(help="The paper's number of trials, or a few.")
+    ] = Profile.PAPER,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Worker processes; one a usable core by default.")
+        int | None,
+        typer.Option(min=1, metavar="N", help="Worker processes; one a usable core by default."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Root seed.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="Root seed; the notebook's by default.")
+    ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for the outputs; figures, or build/PROFILE, by default."),
+        Path | None, typer.Option(metavar="FOLDER", help="Where the outputs go.")
     ] = None,
-    timeout: Annotated[int, typer.Option(min=1, help="Seconds that one cell may take.")] = 3600,
+    timeout: Annotated[
+        int, typer.Option(min=1, metavar="SECONDS", help="Time that one cell may take.")
+    ] = 3600,
     parameters: Pairs = None,
 ) -> None:
-    """Run notebooks and publish their figures, tables and data."""
-    from replication.regenerate import RunError, run_notebooks
+    """Run notebooks and publish their figures, tables and data.
+
+    Outputs go to figures; those of --profile quick to build/quick, and those of a run with --seed
+    or with -p (but for jobs and store) to build/custom.
+    """
+    from replication.regenerate import RunError, run_name, run_notebooks
 
     # A polite kill ends like Ctrl-C: the kernel and its workers stop, and the stage is removed.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
-    default = paths.PROJECT / ("figures" if profile == "paper" else f"build/{profile}")
-    target = out or default
+    values = _values(parameters)
+    name = run_name(profile.value, seed=seed, parameters=values)
+    target = out or paths.PROJECT / ("figures" if name == "paper" else f"build/{name}")
     try:
         published = run_notebooks(
             list(dict.fromkeys(files)),
@@ -140,7 +153,7 @@ def run(
             out=target,
             jobs=jobs,
             seed=seed,
-            parameters=_values(parameters),
+            parameters=values,
             timeout=timeout,
             echo=typer.echo,
         )
@@ -149,18 +162,21 @@ def run(
             plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
             typer.echo(error.details if sys.stderr.isatty() else plain, err=True)
         _fail(str(error), 1)
-    for table in (path for path in published if path.suffix == ".md"):
-        typer.echo(f"\n{table.name}\n{table.read_text(encoding='utf-8').strip()}")
-    executed = paths.PROJECT / "build" / "executed" / profile
+    tables = [path for path in published if path.suffix == ".md"]
+    for table in sorted(tables, key=lambda path: path.stem.endswith("_claims")):  # verdicts last
+        typer.echo(f"\n{table.name}\n\n{table.read_text(encoding='utf-8').strip()}")
+    executed = paths.PROJECT / "build" / "executed" / name
     typer.echo(f"\noutputs ({len(published)}): {_short(target)}")
     typer.echo(f"executed notebooks: {_short(executed)}")
 
 
-@app.command(cls=TwoWords)
+@app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")
 def learn(
-    file: Annotated[Path, typer.Argument(help="A demonstration file.")],
-    method: Annotated[str, typer.Option(help="Name of the method.")] = "unified-incorrect",
-    seed: Annotated[int, typer.Option(min=0, help="Root seed.")] = 0,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A demonstration file.")],
+    method: Annotated[
+        str, typer.Option(metavar="METHOD", help="adaboost, unified or unified-incorrect.")
+    ] = "unified-incorrect",
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Root seed.")] = 0,
     incorrect: Annotated[
         str | None,
         typer.Option(
@@ -168,7 +184,9 @@ def learn(
         ),
     ] = None,
     parameters: Pairs = None,
-    out: Annotated[Path, typer.Option(help="Folder for the result.")] = Path("build/learn"),
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result goes.")] = Path(
+        "build/learn"
+    ),
 ) -> None:
     """Learn a reward from the demonstrations of a file.
 
@@ -184,7 +202,10 @@ def learn(
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
         _fail(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
-    params = Params.of(**{"incorrect": "all", **_values(parameters)})
+    values = _values(parameters)
+    if "incorrect" in values:
+        _fail("-p incorrect is not taken here; choose the incorrect demos with --incorrect SET")
+    params = Params.of(incorrect="all", **values)
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         demos = load_demos(file).select(incorrect or "all")
@@ -200,11 +221,61 @@ def learn(
     typer.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
 
 
-@demos_app.command()
+@demos_app.command(
+    epilog="Example: replicate demos make map.txt --task mine --out mine.json --leg 2"
+)
+def make(
+    map_file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MAP", help="A text file: . free, # obstacle, S start, G goal; one line a row."
+        ),
+    ],
+    task: Annotated[
+        str, typer.Option(metavar="NAME", help="Name of the task, which its files bear.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The demonstration file to write.")],
+    leg: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Cells of a straight leg (choice DEMO-SHAPE)."),
+    ] = None,
+    detour_width: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Cells that a detour keeps off (choice DETOUR-WIDTH)."),
+    ] = None,
+) -> None:
+    """Let the scripted expert demonstrate in a maze of your own.
+
+    Writes one correct demo and incorrect ones of each kind, by the rules of the stored mazes.
+    """
+    from replication.demos import save_demos
+    from replication.envs import Maze, MazeError
+    from replication.expert import demonstrate
+    from replication.params import Expert
+
+    given = {"leg": leg, "detour_width": detour_width}
+    params = Expert(**{name: value for name, value in given.items() if value is not None})
+    try:
+        # a byte that is no UTF-8 becomes a character that the map refuses, with its place
+        maze = Maze.from_text(map_file.read_text(encoding="utf-8-sig", errors="replace"))
+    except MazeError as error:
+        _fail(f"{map_file}: {error}")
+    demos = demonstrate(task, maze, params=params)
+    save_demos(demos, out)
+    kinds = [demo.kind for demo in demos.incorrect]
+    counts = [f"{kinds.count(kind)} {kind}" for kind in demos.kinds]
+    typer.echo(f"{task}: {', '.join([f'{len(demos.correct)} correct', *counts])}")
+    typer.echo(f"demos: {_short(out)}")
+
+
+@demos_app.command(epilog="Example: replicate demos check mine.json")
 def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Files to check.")],
 ) -> None:
-    """Check demonstration files; exit code 1 if any cannot be used."""
+    """Check demonstration files, move by move.
+
+    A warning is about a file that can be used, an error about one that cannot: exit code 1.
+    """
     from replication.demos import DemoError, check_demos
 
     failed = False
@@ -216,13 +287,13 @@ def check(
             failed = True
             continue
         for warning in found:
-            typer.echo(f"{file}: warning: {warning}")
+            typer.echo(f"warning: {warning}")
         if not found:
             typer.echo(f"{file}: ok")
     raise typer.Exit(int(failed))
 
 
-@demos_app.command()
+@demos_app.command(epilog="Example: replicate demos schema > schema.json")
 def schema() -> None:
     """Print the JSON Schema of demonstration files."""
     from replication.demos import json_schema
@@ -230,11 +301,13 @@ def schema() -> None:
     typer.echo(json.dumps(json_schema(), indent=2))
 
 
-@app.command()
+@app.command(epilog="Example: replicate choices ALPHA")
 def choices(
-    id: Annotated[str | None, typer.Argument(metavar="ID", help="Show one whole.")] = None,
+    id: Annotated[
+        str | None, typer.Argument(metavar="ID", help="One choice, to be shown in full.")
+    ] = None,
 ) -> None:
-    """List the choices that the paper leaves open, and ours."""
+    """List what the paper leaves open, what we chose, and what else is accepted."""
     from replication.choices import register, unknown_name
 
     entries = register()

@@ -202,7 +202,7 @@ def _explain(error: ValidationError, data: dict[str, Any]) -> str:
     first = error.errors(include_url=False)[0]
     place, kind = first["loc"], first["type"]
     models = dict(_MODELS)
-    if place[0] == "environment" and len(place) > 1:  # pydantic names the kind as well
+    if place[:1] == ("environment",) and len(place) > 1:  # pydantic names the kind as well
         models["environment"] = _ENVIRONMENTS[str(place[1])]
         place = ("environment", *place[2:])
     if kind == "union_tag_not_found":

@@ -202,12 +202,7 @@ class Demos:
 
     def conflicts(self) -> tuple[int, ...]:
         """States in which the correct demos, taken together, ask for more than one action."""
-        pairs = {
-            pair
-            for demo in self.correct
-            for pair in zip(demo.states.tolist(), demo.actions.tolist(), strict=False)
-        }
-        states = sorted(state for state, _ in pairs)
+        states = sorted(state for state, _ in _pairs(*self.correct))
         return tuple(sorted({a for a, b in pairwise(states) if a == b}))
 
 
@@ -225,7 +220,8 @@ def load_demos(path: str | os.PathLike[str]) -> Demos:
     Warns
     -----
     DemoWarning
-        If no deterministic policy can match the correct demos exactly.
+        If no deterministic policy can match the correct demos exactly, or if an incorrect demo
+        has no effect.
     """
     demos = _read(path)
     for doubt in _doubts(demos):
@@ -322,7 +318,7 @@ def _demo(environment: Environment, kind: str, fields: CorrectFields | Incorrect
 
 
 def _doubts(demos: Demos) -> list[str]:
-    """Why no deterministic policy can match the correct demos, if so."""
+    """Say what cannot be learned from the demonstrations, though they can be used."""
     doubts = []
     conflicts = demos.conflicts()
     if conflicts:
@@ -339,7 +335,23 @@ def _doubts(demos: Demos) -> list[str]:
             f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
             "which a single deterministic trajectory cannot match"
         )
+    right = _pairs(*demos.correct)
+    doubts += [
+        f"incorrect demo {show(demo.name)} has no effect: each of its pairs of a state and an "
+        "action is a correct demo's, too"
+        for demo in demos.incorrect
+        if _pairs(demo) <= right
+    ]
     return doubts
+
+
+def _pairs(*demos: Demo) -> set[tuple[int, int]]:
+    """All pairs of a state and the action taken there."""
+    return {
+        pair
+        for demo in demos
+        for pair in zip(demo.states.tolist(), demo.actions.tolist(), strict=False)
+    }
 
 
 def _read(path: str | os.PathLike[str]) -> Demos:

@@ -1,7 +1,7 @@
 """Feature expectations of trajectories: Eqs. 3, 5, 7 and 11.
 
-Features are one-hot over state-action pairs, so feature expectations are arrays `[state, action]`
-and the reward of a pair is its weight, R(s, a) = w(s, a) (Eq. 2).
+Features are one-hot over state-action pairs (choice FEATURES), so feature expectations are arrays
+`[state, action]` and the reward of a pair is its weight, R(s, a) = w(s, a) (Eq. 2).
 """
 
 from __future__ import annotations
@@ -68,11 +68,19 @@ def feature_expectations(
 def expert_expectations(
     demos: Iterable[Trajectory], *, gamma: float, shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return mu_E [state, action], the mean over the correct demonstrations (Eq. 5)."""
-    each = [
-        feature_expectations(demo.states, demo.actions, gamma=gamma, shape=shape) for demo in demos
-    ]
-    return np.mean(each, axis=0)
+    """Return mu_E [state, action], the mean over the correct demonstrations (Eq. 5).
+
+    Equal demonstrations are weighed, not added up, so that any number of them has the bits of one:
+    else rounding alone would keep d from reaching zero.
+    """
+    counts: dict[tuple[bytes, bytes], int] = {}
+    each: dict[tuple[bytes, bytes], NDArray[np.float64]] = {}
+    for demo in demos:
+        key = demo.states.tobytes(), demo.actions.tobytes()
+        counts[key] = counts.get(key, 0) + 1
+        each[key] = feature_expectations(demo.states, demo.actions, gamma=gamma, shape=shape)
+    total = sum(counts.values())
+    return np.sum([counts[key] / total * mu for key, mu in each.items()], axis=0)
 
 
 def visited(demos: Iterable[Trajectory], *, shape: tuple[int, int]) -> NDArray[np.bool_]:

@@ -17,11 +17,12 @@ from typing import Any, ParamSpec
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -135,14 +136,14 @@ def maze_figure(demos: Demos) -> Figure:
     """Draw the map with correct demonstrations, and with incorrect ones too (Figs. 4 and 8)."""
     figure, axes = _figure(1, 2, height=4.0)
     for panel, title in zip(axes, ("(a) correct", "(b) correct and incorrect"), strict=True):
-        _draw_map(panel, demos.environment)
+        _draw_map(panel, demos.maze)
         panel.set_title(title)
     on_path = {int(state) for demo in demos.correct for state in demo.states}
     for demo in demos.incorrect:
-        _draw_departure(axes[1], demos.environment, demo, on_path)
+        _draw_departure(axes[1], demos.maze, demo, on_path)
     for panel in axes:
         for demo in demos.correct:
-            _draw_arrows(panel, demos.environment, demo)
+            _draw_arrows(panel, demos.maze, demo)
     handles = [Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct")]
     for kind in demos.kinds:
         mark = "x" if kind == "hit" else ""
@@ -161,12 +162,14 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
     The line is one trial, declared before the run; the band holds the middle half of all trials.
     Triangles on the axis mark where the paper's own curves reach zero.
     """
-    figure, axes = _figure(1, len(panels), height=3.0, sharex=True, sharey=True)
+    figure, axes = _figure(1, len(panels), height=3.2, sharex=True, sharey=True)
     for panel, (title, curves) in zip(axes, panels.items(), strict=True):
         for one in curves:
             iterations = np.arange(one.errors.shape[1])
             low, high = np.quantile(one.errors, [0.25, 0.75], axis=0)
             panel.fill_between(iterations, low, high, color=one.colour, alpha=0.18, lw=0)
+            for edge in (low, high):
+                panel.plot(iterations, edge, color=one.colour, alpha=0.5, lw=0.5)
             traced = one.errors[one.traced]
             end = int(np.argmax(traced <= 0)) if (traced <= 0).any() else len(traced) - 1
             panel.plot(iterations[: end + 1], traced[: end + 1], **_line(one))
@@ -182,12 +185,13 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
                     clip_on=False,
                     zorder=5,
                 )
-        panel.set(title=title, xlabel="iteration", xlim=(0, None), ylim=(0, None))
-    axes[0].set_ylabel("error d")
+        panel.set(title=title, xlabel="iteration")
+    axes[0].set(ylabel="error d", xlim=(0, None), ylim=(0, None))
     first = next(iter(panels.values()))
-    handles = [Line2D([], [], label=one.label, **_line(one)) for one in first]
+    handles: list[Artist] = [Line2D([], [], label=one.label, **_line(one)) for one in first]
+    handles.append(Patch(color="0.4", alpha=0.25, lw=0, label="middle half of all trials"))
     handles.append(
-        Line2D([], [], color="0.4", marker="o", ms=4, lw=0, label="trial 0 reaches d = 0")
+        Line2D([], [], color="0.4", marker="o", ms=4, lw=0, label="the drawn trial is at zero")
     )
     if any(one.published is not None for one in first):
         handles.append(
@@ -214,11 +218,11 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
             left.plot(one.iterations, **_line(one))
             _draw_distribution(right, position, one)
         left.set_title(title, loc="left")
-        left.set(ylabel="iterations", xlim=(-1, len(counts[0].iterations)), ylim=(0, None))
+        left.set(ylabel="iterations", xlim=(-1, len(counts[0].iterations)))
         right.set(xticks=[], xlim=(-0.7, len(counts) - 0.3))
         right.spines["bottom"].set_visible(False)
         right.tick_params(labelleft=False)
-    np.atleast_2d(grid)[-1, 0].set_xlabel("trial")
+    np.atleast_2d(grid)[-1, 0].set(xlabel="trial", ylim=(0, None))
     first = next(iter(panels.values()))
     handles = [Line2D([], [], label=one.label, **_line(one)) for one in first]
     handles.append(Line2D([], [], color="0.3", marker="o", ms=5, lw=0, label="our mean"))
@@ -251,7 +255,17 @@ def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> 
             (position * share + 0.015, 0.04, share - 0.03, 0.88), projection="3d"
         )
         height = np.where(maze.free, values, np.nan).reshape(maze.shape)
-        panel.plot_surface(x, y, height, cmap="viridis", rstride=1, cstride=1, lw=0.1, ec="0.35")
+        panel.plot_surface(
+            x,
+            y,
+            height,
+            rstride=1,
+            cstride=1,
+            lw=0.1,
+            ec="0.35",
+            facecolors=_face_colours(height),
+            shade=False,
+        )
         panel.set_title(title, y=0.99)
         panel.set_xlabel("x (cells)", labelpad=-8)
         panel.set_ylabel("y (cells)", labelpad=-8)
@@ -273,6 +287,9 @@ def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
     panels
         By title: a table with `set`, `leaving`, and `saved` with its interval `low` to `high`.
     """
+    if not panels:
+        columns = ["set", "leaving", "saved", "low", "high"]
+        panels = {"no incorrect demonstrations": pd.DataFrame(columns=columns)}
     rows = len(next(iter(panels.values())))
     figure, axes = _figure(1, len(panels), height=1.1 + 0.26 * rows, sharex=True, sharey=True)
     for panel, (title, table) in zip(axes, panels.items(), strict=True):
@@ -292,7 +309,7 @@ def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
 @_settled
 def fit_figure(fit: Fit) -> Figure:
     """Draw a fit: the map with demonstrations and the learned path, the reward, and the errors."""
-    maze = fit.demos.environment
+    maze = fit.demos.maze
     figure, axes = _figure(1, 3, height=3.0)
     _draw_map(axes[0], maze)
     for demo in fit.demos.correct:
@@ -320,12 +337,23 @@ def _figure(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tup
     return figure, np.atleast_1d(axes)
 
 
+def _face_colours(height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the colour of each facet by its highest corner, so that peaks of one cell show."""
+    corners = np.stack([height[:-1, :-1], height[1:, :-1], height[:-1, 1:], height[1:, 1:]])
+    top = np.where(np.isnan(corners).any(axis=0), np.nan, corners.max(axis=0))
+    scaled = (top - np.nanmin(height)) / max(np.nanmax(height) - np.nanmin(height), 1e-300)
+    colours: NDArray[np.float64] = mpl.colormaps["viridis"](scaled)
+    return colours
+
+
 def _line(one: Curves | Counts) -> dict[str, Any]:
     return {"color": one.colour, "lw": 1.1, "ls": (0, (4, 1.5)) if one.dashed else "-"}
 
 
-def _legend_below(figure: Figure, handles: list[Line2D]) -> None:
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
+def _legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=len(handles) if len(handles) < 5 else 3
+    )
 
 
 def _places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -346,7 +374,7 @@ def _draw_map(panel: Axes, maze: Maze) -> None:
         ((left,), (bottom,)) = _places(maze, np.array([state]))
         panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=colour, alpha=0.55, lw=0))
         panel.annotate(
-            letter, (left, bottom), (0, -7.5), textcoords="offset points", ha="center", va="center"
+            letter, (left, bottom), (0, -9), textcoords="offset points", ha="center", va="center"
         )
     for line in range(n_columns + 1):
         panel.axvline(line - 0.5, color="0.9", lw=0.4, zorder=0)

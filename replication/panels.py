@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from replication.comparisons import F_INDICES, F_LABELS, Key
 from replication.demos import Demos
 from replication.envs.maze import Maze
+from replication.expectations import visited
 from replication.figures import COLOURS, Counts, Curves
 from replication.irl import Trial, get_method
 from replication.params import Report
@@ -23,10 +24,19 @@ def error_panels(
     settings: Mapping[Key, Setting],
     methods: Sequence[str],
     published: Mapping[str, int],
+    *,
+    median: bool = False,
 ) -> dict[str, list[Curves]]:
-    """Return the errors of some methods, a panel for each reading of Eq. 9 (Figs. 5 and 9).
+    """Return the errors of some methods, a panel for each reading of Eq. 9 (Figs. 5, 9 and 12).
 
-    `published` gives the iteration at which the paper's own curve is zero.
+    Parameters
+    ----------
+    results, settings, methods
+        What to draw.
+    published
+        The iteration at which the paper's own curve is zero.
+    median
+        Whether each curve is that of the median trial (FIG12-TRIAL), or of trial 0 (FIG5-TRIAL).
     """
     return {
         F_LABELS[f]: [
@@ -34,7 +44,9 @@ def error_panels(
                 get_method(name).label,
                 COLOURS[name],
                 results.errors(_setting(settings, name, f)),
-                TRACED_TRIAL,
+                median_trial(results.iterations(_setting(settings, name, f)))
+                if median
+                else TRACED_TRIAL,
                 published.get(name),
                 dashed=name == "unified-incorrect",
             )
@@ -69,6 +81,18 @@ def iteration_panels(
     }
 
 
+def median_trial(iterations: NDArray[np.int64]) -> int:
+    """Return the first trial with the (lower) median number of iterations.
+
+    Examples
+    --------
+    >>> median_trial(np.array([9, 3, 5, 5]))
+    2
+    """
+    middle = np.sort(iterations)[(len(iterations) - 1) // 2]
+    return int(np.flatnonzero(iterations == middle)[0])
+
+
 def surfaces(trial: Trial, report: Report) -> dict[str, NDArray[np.float64]]:
     """Return Q in the mid-term, Q at the end and the reward at the end, each [state] (Fig. 7).
 
@@ -89,6 +113,41 @@ def surfaces(trial: Trial, report: Report) -> dict[str, NDArray[np.float64]]:
     }
 
 
+def marked_pairs(results: Results, setting: Setting) -> pd.DataFrame:
+    """Return how often Algorithm 2's special case applies in the traced trial, by iteration.
+
+    `wrong` counts the pairs that the agent visits and the expert never does; `marked` those of them
+    that an incorrect demonstration visits; `again` those that were marked and wrong before: under
+    F_i as printed only these are moved with the largest trace.
+    """
+    trial = results.trial(setting, TRACED_TRIAL, snapshots=True)
+    assert trial.snapshots is not None, "the traced trial keeps its snapshots"
+    shape = setting.task.shape
+    incorrect = visited(setting.selected.incorrect, shape=shape)
+    expert = visited(setting.selected.correct, shape=shape)
+    before = np.zeros(shape, dtype=bool)
+    rows = []
+    for i, (states, actions) in enumerate(
+        zip(trial.snapshots.states, trial.snapshots.actions, strict=True)
+    ):
+        seen = np.zeros(shape, dtype=bool)
+        seen[states[: len(actions)], actions] = True
+        wrong = seen & ~expert
+        marked = wrong & incorrect
+        rows.append(
+            {
+                "iteration": i,
+                "error": round(float(trial.errors[i]), 4),
+                "decisions": len(actions),
+                "wrong": int(wrong.sum()),
+                "marked": int(marked.sum()),
+                "again": int((marked & before).sum()),
+            }
+        )
+        before |= marked
+    return pd.DataFrame(rows)
+
+
 def set_panels(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Return what each set of incorrect demonstrations saves, a panel for each reading of Eq. 9.
 
@@ -106,12 +165,18 @@ def set_panels(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
             "high": 0 - shown["low"],
         }
     )
-    return {F_LABELS[f]: part for f, part in saved.groupby("F", sort=False)}
+    titles = F_LABELS | {"": "one choice changed at a time"}
+    return {titles[f]: part for f, part in saved.groupby("F", sort=False)}
+
+
+def set_numbers(panels: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return what a figure of sets shows: one row a set and reading of Eq. 9."""
+    return pd.concat(panels.values()) if panels else pd.DataFrame(columns=["F", "set", "saved"])
 
 
 def demo_numbers(demos: Demos) -> pd.DataFrame:
     """Return demonstrations as rows: kind, demo, step, and x, y in cells from the lower left."""
-    maze = demos.environment
+    maze = demos.maze
     rows = []
     for demo in (*demos.correct, *demos.incorrect):
         for step, state in enumerate(demo.states):
@@ -130,7 +195,8 @@ def error_numbers(panels: Mapping[str, Sequence[Curves]]) -> pd.DataFrame:
                 "F": title,
                 "method": one.label,
                 "iteration": np.arange(len(low)),
-                f"trial_{one.traced}": one.errors[one.traced],
+                "drawn_trial": one.traced,
+                "error": one.errors[one.traced],
                 "quartile_1": low,
                 "median": middle,
                 "quartile_3": high,

@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import re
+import shlex
 import shutil
 import sys
 import tempfile
@@ -34,6 +35,12 @@ STARTS = 3
 
 KERNEL = "replication"
 
+NEUTRAL = frozenset({"jobs", "store"})
+"""Parameters that leave every result as it is."""
+
+MISTAKES = frozenset({"ChoiceError", "DemoError", "MazeError"})
+"""What a cell raises when the user's parameters or files are at fault, not the notebook."""
+
 # What papermill logs of a failure is said again, and better, by the error that is raised.
 logging.getLogger("papermill").addHandler(logging.NullHandler())
 
@@ -47,6 +54,25 @@ class RunError(RuntimeError):
 
 
 # --- running ---------------------------------------------------------------------------------
+
+
+def run_name(
+    profile: str, *, seed: int | None = None, parameters: Mapping[str, Any] | None = None
+) -> str:
+    """Name what a run is: its profile, or "custom" where a result may differ from the profile's.
+
+    Examples
+    --------
+    >>> run_name("paper", parameters={"jobs": 2}), run_name("paper", parameters={"trials": 2})
+    ('paper', 'custom')
+    """
+    return "custom" if _changes(seed, parameters) else profile
+
+
+def _changes(seed: int | None, parameters: Mapping[str, Any] | None) -> list[str]:
+    """Return the options by which a run departs from its profile."""
+    named = [f"-p {name}" for name in parameters or {} if name not in NEUTRAL]
+    return named if seed is None else [*named, "--seed"]
 
 
 def run_notebooks(
@@ -75,7 +101,8 @@ def run_notebooks(
     profile
         "paper", or another name that notebooks may have parameter values for.
     out
-        Folder for the outputs; made when missing.
+        Folder for the outputs; made when missing. The project's `figures` hold what the profile
+        "paper" gives, unchanged, and take nothing else.
     jobs
         Worker processes, for the parameter `jobs`; None gives those notebooks that have the
         parameter as many as there are usable cores.
@@ -85,7 +112,7 @@ def run_notebooks(
         Other parameter values, which every notebook must know.
     executed
         Folder for the executed notebooks, of failed runs too; `build/executed` by default. They
-        go to its sub-folder named after the profile.
+        go to its sub-folder named by :func:`run_name`.
     timeout
         Seconds that one cell may take.
     progress
@@ -101,14 +128,20 @@ def run_notebooks(
     Raises
     ------
     NotebookError
-        If a notebook cannot be run or a parameter is unknown or of the wrong type; nothing ran.
+        If a notebook cannot be run, a parameter is unknown or of the wrong type, or `figures`
+        would take another run's results; nothing ran. Also if a cell refuses a choice, a map or
+        demonstrations: then earlier notebooks ran.
     RunError
         If a cell failed, took too long or killed its kernel, or if the files in `out` are not the
         declared ones.
     """
-    if profile != "paper" and out.resolve() == paths.PROJECT / "figures":
+    changes = _changes(seed, parameters)
+    if profile != "paper":
+        changes.insert(0, f"--profile {profile}")
+    if changes and out.resolve().is_relative_to((paths.PROJECT / "figures").resolve()):
         raise NotebookError(
-            f"{out} holds the results of the profile 'paper'; choose another folder for {profile!r}"
+            f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
+            f"for a run with {', '.join(changes)}"
         )
     runs = []
     for notebook in map(read_notebook, notebooks):
@@ -130,7 +163,8 @@ def run_notebooks(
         runs.append((notebook, values))
     _check_apart([notebook for notebook, _ in runs])
 
-    folder = (executed or paths.PROJECT / "build" / "executed") / profile
+    name = run_name(profile, seed=seed, parameters=parameters)
+    folder = (executed or paths.PROJECT / "build" / "executed") / name
     for needed in (out, folder):
         try:
             needed.mkdir(parents=True, exist_ok=True)
@@ -158,9 +192,15 @@ def run_notebooks(
             _check_outputs(notebook, stage, stamps)
             published += _publish(notebook, stage, out)
         seconds = time.perf_counter() - began
-        number = "1 output" if len(notebook.outputs) == 1 else f"{len(notebook.outputs)} outputs"
-        echo(f"{notebook.name}: {number} in {seconds:.1f} s")
+        echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s")
     return list(dict.fromkeys(published))
+
+
+def _number(notebook: Notebook) -> str:
+    """Say what a notebook wrote; what it shares with others is named, not counted."""
+    own = len(notebook.outputs) - len(notebook.merged)
+    number = "1 output" if own == 1 else f"{own} outputs"
+    return " and rows of ".join((number, *notebook.merged))
 
 
 def _check_apart(notebooks: Sequence[Notebook]) -> None:
@@ -245,7 +285,10 @@ def _execute(
                 on_cell_execute=begin,
             )
         except PapermillExecutionError as error:
-            said = f"{error.ename}: {first_line(error.evalue)}"
+            said = first_line(error.evalue)
+            if error.ename in MISTAKES:
+                refuse(notebook.path, said + _example(notebook, values, said))
+            said = f"{error.ename}: {said}"
             details = "\n".join(error.traceback)
             raise RunError(f"{place(error.cell_index)} failed: {said}", details) from None
         except Exception as error:
@@ -264,6 +307,14 @@ def _execute(
         if node.cells[begun[-1]].metadata.papermill.exception:  # SystemExit, no error to papermill
             raise RunError(f"{place(begun[-1])} ended the notebook before its last cell")
         return
+
+
+def _example(notebook: Notebook, values: Mapping[str, Any], said: str) -> str:
+    """Show how to take the kinds that a file has, if it lacks one that was asked for."""
+    if "has no incorrect demo of kind" not in said or "choices" not in notebook.literals:
+        return ""
+    choices = {**values.get("choices", {}), "incorrect": "all"}
+    return f", such as -p choices {shlex.quote(json.dumps(choices))}"
 
 
 # --- what a run leaves -----------------------------------------------------------------------

@@ -65,7 +65,7 @@ def incorrect_demos(
     if params.leave == "every":
         leave = list(range(len(correct)))
     sides = (RIGHT, LEFT)
-    drives = {
+    drives: dict[str, list[list[int] | None]] = {
         "hit": [_hit(field, correct[:t], side) for t in leave for side in sides],
         "detour": [_detour(field, correct, t, side) for t in leave for side in sides],
         "overspeed": [_overspeed(field, correct[:t]) for t in leave],
@@ -116,7 +116,7 @@ def _drive(
 ) -> list[int] | None:
     """Take actions and go on with a policy to the goal, or to a contact; None if neither."""
     world = FastSoccerWorld(field.params)
-    state, actions = world.reset(), []
+    state, actions = world.reset(), list[int]()
     while len(actions) < LONGEST:
         action = begin[len(actions)] if len(actions) < len(begin) else policy(world, state)
         state, scored, timed_out = world.step(action)

@@ -7,8 +7,10 @@ is not testable.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +21,12 @@ ALPHA = 0.05
 RESAMPLES = 9999
 BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
 
+FEWEST = 30
+"""Trials below which no verdict is given."""
+
 REPRODUCED = "reproduced"
 REVERSED = "reversed"
+UNDECIDED = "undecided"
 NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable"
 
@@ -52,11 +58,16 @@ class Comparison:
         Probability that a trial of x needs fewer iterations than one of y, ties counting half.
     p_welch, p_wilcoxon
         Two-sided p-values of Welch's t-test and of the paired signed-rank test.
-    sd_ratio, p_spread
-        SD of x over SD of y, and the p-value of the Brown-Forsythe test of equal spread.
+    sd_ratio, sd_low, sd_high
+        SD of x over SD of y with its BCa bootstrap interval, trials resampled in pairs.
+    p_spread
+        P-value of the Brown-Forsythe test of equal spread (which takes samples as independent).
     power
-        Probability that a paired t-test at 5 % would find a true difference as large as the
-        published one, given the spread of our differences; NaN where none is published.
+        Probability that a t-test at 5 % would find a true difference as large as the published
+        one between samples that spread as ours do, taken as independent, since pairs that hardly
+        differ say nothing about pairs that would; NaN where none is published.
+    n
+        Number of trials.
     """
 
     difference: float
@@ -66,8 +77,11 @@ class Comparison:
     p_welch: float
     p_wilcoxon: float
     sd_ratio: float
+    sd_low: float
+    sd_high: float
     p_spread: float
     power: float
+    n: int
 
 
 def summarise(iterations: ArrayLike, converged: ArrayLike) -> Summary:
@@ -99,10 +113,12 @@ def compare(
     """
     a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if capped:
-        return Comparison(*(np.nan,) * 9)
+        return Comparison(*(np.nan,) * 11, n=len(a))
     low, high = mean_interval(a - b)
     equal = bool((a == b).all())
     flat = a.std() == 0 or b.std() == 0
+    few = flat or len(a) < FEWEST
+    sd_low, sd_high = (np.nan, np.nan) if few else _bootstrap((a, b), _sd_ratio)
     moments = [moment for s in (a, b) for moment in (s.mean(), s.std(ddof=1), len(s))]
     with np.errstate(divide="ignore", invalid="ignore"):  # samples that do not spread
         welch = stats.ttest_ind_from_stats(*moments, equal_var=False).pvalue
@@ -114,9 +130,12 @@ def compare(
         fewer=float((a[:, None] < b).mean() + 0.5 * (a[:, None] == b).mean()),
         p_welch=1.0 if equal else float(welch),
         p_wilcoxon=1.0 if equal else float(stats.wilcoxon(a, b).pvalue),
-        sd_ratio=np.nan if flat else float(a.std(ddof=1) / b.std(ddof=1)),
+        sd_ratio=np.nan if flat else float(_sd_ratio(a, b)),
+        sd_low=sd_low,
+        sd_high=sd_high,
         p_spread=np.nan if flat else float(spread),
-        power=power(a - b, published),
+        power=power(float(np.hypot(a.std(ddof=1), b.std(ddof=1))), len(a), published),
+        n=len(a),
     )
 
 
@@ -124,20 +143,49 @@ def mean_interval(differences: NDArray[np.float64]) -> tuple[float, float]:
     """Return the BCa bootstrap interval of a mean; a constant sample is its own interval."""
     if np.ptp(differences) == 0:
         return float(differences[0]), float(differences[0])
-    interval = stats.bootstrap(
-        (differences,),
-        np.mean,
-        confidence_level=CONFIDENCE,
-        n_resamples=RESAMPLES,
-        method="BCa",
-        rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
-    ).confidence_interval
-    return float(interval.low), float(interval.high)
+    return _bootstrap((differences,), np.mean)
 
 
-def power(differences: NDArray[np.float64], effect: float) -> float:
-    """Return the power of a two-sided paired t-test at 5 % for a true mean difference `effect`."""
-    n, sd = len(differences), differences.std(ddof=1)
+def _sd_ratio(
+    a: NDArray[np.float64], b: NDArray[np.float64], axis: int = -1
+) -> NDArray[np.float64]:
+    return np.std(a, axis=axis, ddof=1) / np.std(b, axis=axis, ddof=1)
+
+
+def _bootstrap(
+    samples: tuple[NDArray[np.float64], ...], statistic: Callable[..., Any]
+) -> tuple[float, float]:
+    """Return the BCa interval of a statistic, trials resampled together."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # no resample changes it
+        found = stats.bootstrap(
+            samples,
+            statistic,
+            paired=True,
+            vectorized=True,
+            confidence_level=CONFIDENCE,
+            n_resamples=RESAMPLES,
+            method="BCa",
+            rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
+        )
+    spread = found.bootstrap_distribution
+    if np.ptp(spread) <= 1e-12 * abs(spread[0]):
+        return float(spread[0]), float(spread[0])
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def power(sd: float, n: int, effect: float) -> float:
+    """Return the power of a two-sided t-test at 5 % for a true mean difference `effect`.
+
+    Parameters
+    ----------
+    sd
+        Standard deviation of a single difference.
+    n
+        Number of differences.
+    effect
+        The true mean difference.
+    """
     if not np.isfinite(effect) or sd == 0:
         return float("nan")
     critical = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)
@@ -146,30 +194,41 @@ def power(differences: NDArray[np.float64], effect: float) -> float:
     return float(stats.nct.sf(critical, n - 1, shift) + np.nan_to_num(wrong_side))
 
 
-def verdict_fewer(comparison: Comparison) -> str:
+def verdict_fewer(comparison: Comparison, p: float) -> str:
     """Judge "x needs fewer iterations than y".
 
-    The criterion: reproduced if the whole interval of the mean difference lies below zero,
-    reversed if it lies above, not reproduced if it contains zero.
+    The criterion has two locks: the interval of the mean difference excludes zero, and the
+    signed-rank test rejects at 5 % after Holm's adjustment. Reproduced, or reversed, if both say
+    so; not reproduced if neither does; undecided if they disagree.
+
+    Parameters
+    ----------
+    comparison
+        Of x with y.
+    p
+        The adjusted p-value.
     """
-    if np.isnan(comparison.difference):
-        return NOT_TESTABLE
-    if comparison.high < 0:
-        return REPRODUCED
-    return REVERSED if comparison.low > 0 else NOT_REPRODUCED
+    return _verdict(comparison, comparison.low, comparison.high, 0.0, p)
 
 
-def verdict_steadier(comparison: Comparison) -> str:
+def verdict_steadier(comparison: Comparison, p: float) -> str:
     """Judge "the iterations of x spread less than those of y".
 
-    The criterion: reproduced if the SD of x is the smaller one and the Brown-Forsythe test rejects
-    equal spread at 5 %, reversed if it is the larger one and the test rejects, else not reproduced.
+    As :func:`verdict_fewer`, with the interval of the ratio of SDs, which has to exclude one, and
+    the Brown-Forsythe test.
     """
-    if np.isnan(comparison.p_spread):
+    return _verdict(comparison, comparison.sd_low, comparison.sd_high, 1.0, p)
+
+
+def _verdict(comparison: Comparison, low: float, high: float, null: float, p: float) -> str:
+    if comparison.n < FEWEST or np.isnan([low, high, p]).any():
         return NOT_TESTABLE
-    if comparison.p_spread >= ALPHA:
+    excluded, rejected = not low <= null <= high, p < ALPHA
+    if excluded != rejected:
+        return UNDECIDED
+    if not excluded:
         return NOT_REPRODUCED
-    return REPRODUCED if comparison.sd_ratio < 1 else REVERSED
+    return REPRODUCED if high < null else REVERSED
 
 
 def prediction_interval(mean: float, sd: float, n: int, m: int) -> tuple[float, float]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from replication.comparisons import F_LABELS, Claim, Key
+from replication.comparisons import F_INDICES, F_LABELS, Claim, Key
 from replication.demos import Demos
+from replication.envs.maze import Maze
 from replication.expectations import visited
 from replication.files import write_file
 from replication.irl import get_method
@@ -26,6 +28,7 @@ from replication.statistics import (
     verdict_fewer,
     verdict_steadier,
 )
+from replication.trials import Results
 
 
 def rows_of(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
@@ -70,12 +73,13 @@ def summary_table(
         row = {"method": get_method(method).label, "F": f, **asdict(ours)}
         if method in published:
             paper = published[method]
-            low, high = prediction_interval(paper.mean, paper.sd, paper.n, ours.n)
-            test = stats.ttest_ind_from_stats(
-                ours.mean, ours.sd, ours.n, paper.mean, paper.sd, paper.n, equal_var=False
-            )
             row |= {"paper_mean": paper.mean, "paper_sd": paper.sd}
-            row |= {"predicted_low": low, "predicted_high": high, "p_paper": test.pvalue}
+            if paper.n > 1:
+                low, high = prediction_interval(paper.mean, paper.sd, paper.n, ours.n)
+                test = stats.ttest_ind_from_stats(
+                    ours.mean, ours.sd, ours.n, paper.mean, paper.sd, paper.n, equal_var=False
+                )
+                row |= {"predicted_low": low, "predicted_high": high, "p_paper": test.pvalue}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -89,17 +93,21 @@ def claims_table(
     """Return one row for each claim and reading of Eq. 9, with its verdict.
 
     `p` is that of the paired signed-rank test for "fewer" and of the Brown-Forsythe test for
-    "steadier", `p_holm` the same adjusted over all rows. Verdicts follow the criterion alone.
+    "steadier", `p_holm` the same adjusted over all rows of the table. `paper_effect` is the
+    published difference of means, or ratio of SDs.
     """
-    rows = []
+    rows, judges = [], []
     for claim in claims:
         for f in dict.fromkeys(f for method, f in settings if method == claim.x):
             x = settings[claim.x, f]
             y = settings[claim.y, f] if (claim.y, f) in settings else settings[claim.y, ""]
-            both = claim.x in published and claim.y in published
-            effect = published[claim.x].mean - published[claim.y].mean if both else np.nan
-            found = comparison(trials, x, y, published=effect)
+            difference, ratio = np.nan, np.nan
+            if claim.x in published and claim.y in published:
+                difference = published[claim.x].mean - published[claim.y].mean
+                ratio = published[claim.x].sd / published[claim.y].sd
+            found = comparison(trials, x, y, published=difference)
             fewer = claim.judged == "fewer"
+            judges.append((verdict_fewer if fewer else verdict_steadier, found))
             rows.append(
                 {
                     "claim": claim.text,
@@ -107,23 +115,65 @@ def claims_table(
                     "F": f,
                     "judged": claim.judged,
                     **asdict(found),
-                    "paper_difference": effect,
+                    "paper_effect": difference if fewer else ratio,
                     "p": found.p_wilcoxon if fewer else found.p_spread,
-                    "verdict": verdict_fewer(found) if fewer else verdict_steadier(found),
                 }
             )
     table = pd.DataFrame(rows)
-    table.insert(len(table.columns) - 1, "p_holm", holm(table["p"].tolist()))
+    table["p_holm"] = holm(table["p"].tolist())
+    table["verdict"] = [
+        judge(found, p) for (judge, found), p in zip(judges, table["p_holm"], strict=True)
+    ]
     return table
+
+
+def rules_table(
+    trials: pd.DataFrame, rules: Mapping[str, Setting], unified: Mapping[str, Setting]
+) -> pd.DataFrame:
+    """Return one row for each reading of AdaBoost-IRL, compared with the unified method.
+
+    Parameters
+    ----------
+    trials
+        Tidy trials of all of them.
+    rules
+        Settings of AdaBoost-IRL by the reading's name.
+    unified
+        Settings of the unified method by the reading of Eq. 9.
+    """
+    rows = []
+    for rule, setting in rules.items():
+        own = rows_of(trials, setting)
+        row = {"rule": rule, **asdict(summarise(own["iterations"], own["converged"]))}
+        for f, other in unified.items():
+            row[f"fewer_{f}"] = comparison(trials, other, setting).fewer
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def readable_rules(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of readings of AdaBoost-IRL as a reader wants it."""
+    readable = table[["rule"]].rename(columns={"rule": "Reading"})
+    readable["Mean (SD)"] = [
+        f"{_number(mean)} ({_number(sd)})"
+        for mean, sd in zip(table["mean"], table["sd"], strict=True)
+    ]
+    readable["Median (quartiles)"] = _quartiles(table)
+    readable["At the cap"] = [
+        f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    ]
+    for f in F_INDICES:
+        readable[f"P(unified fewer), {F_LABELS[f]}"] = table[f"fewer_{f}"].map(_number)
+    return readable
 
 
 def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.DataFrame:
     """Return one row for each set of incorrect demonstrations and reading of Eq. 9.
 
     Beside the difference from no incorrect demonstrations stand the numbers of pairs by their
-    distance from the correct path, see :func:`pairs_near`.
+    distance from the correct path, see :func:`pairs_near`. P-values are adjusted over all rows.
     """
-    rows = []
+    rows, comparisons = [], []
     for (kinds, f), setting in settings.items():
         found = comparison(trials, setting, settings["none", f])
         own = rows_of(trials, setting)
@@ -139,10 +189,84 @@ def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.Data
                 "difference": found.difference,
                 "low": found.low,
                 "high": found.high,
-                "verdict": "" if kinds == "none" else verdict_fewer(found),
+                "p": np.nan if kinds == "none" else found.p_wilcoxon,
             }
         )
-    return pd.DataFrame(rows)
+        comparisons.append(found)
+    table = pd.DataFrame(rows)
+    table["p_holm"] = np.nan
+    judged = table["set"] != "none"
+    table.loc[judged, "p_holm"] = holm(table.loc[judged, "p"].tolist())
+    table["verdict"] = [
+        verdict_fewer(found, p) if is_judged else ""
+        for found, p, is_judged in zip(comparisons, table["p_holm"], judged, strict=True)
+    ]
+    return table
+
+
+def readings_table(
+    results: Results, readings: Mapping[str, tuple[Setting, Setting]]
+) -> pd.DataFrame:
+    """Return one row for each reading of the task: what incorrect demonstrations save in it.
+
+    Parameters
+    ----------
+    results
+        The trials of all settings.
+    readings
+        By name, a setting without and one with incorrect demonstrations.
+    """
+    rows, comparisons = [], []
+    for name, (without, with_them) in readings.items():
+        a, b = results.iterations(without), results.iterations(with_them)
+        done = [results.converged(setting) for setting in (without, with_them)]
+        found = compare(b, a, capped=not all(one.all() for one in done))
+        plain, marked = (summarise(x, one) for x, one in zip((a, b), done, strict=True))
+        near = pairs_near(with_them.selected)
+        rows.append(
+            {
+                "set": name,
+                "F": "",
+                "demonstrations": len(with_them.selected.incorrect),
+                "pairs": near["pairs"],
+                "leaving": near["leaving"],
+                "moves": len(with_them.demos.correct[0].actions),
+                "without_mean": plain.mean,
+                "without_sd": plain.sd,
+                "with_mean": marked.mean,
+                "with_sd": marked.sd,
+                "capped": plain.capped + marked.capped,
+                "difference": found.difference,
+                "low": found.low,
+                "high": found.high,
+                "p": found.p_wilcoxon,
+            }
+        )
+        comparisons.append(found)
+    table = pd.DataFrame(rows)
+    table["p_holm"] = holm(table["p"].tolist())
+    table["verdict"] = [
+        verdict_fewer(found, p) for found, p in zip(comparisons, table["p_holm"], strict=True)
+    ]
+    return table
+
+
+def readable_readings(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of readings as a reader wants it."""
+    readable = table[["set", "moves", "demonstrations", "pairs", "leaving"]].rename(
+        columns=lambda name: "Reading" if name == "set" else name.capitalize()
+    )
+    for column in ("without", "with"):
+        readable[f"{column.capitalize()}: mean (SD)"] = [
+            f"{_number(mean)} ({_number(sd)})"
+            for mean, sd in zip(table[f"{column}_mean"], table[f"{column}_sd"], strict=True)
+        ]
+    readable["Saves [95 %]"] = [
+        _interval(0 - row.difference, 0 - row.high, 0 - row.low) for row in table.itertuples()
+    ]
+    readable["p, Holm"] = table["p_holm"].map(_p)
+    readable["Verdict"] = table["verdict"]
+    return readable
 
 
 def pairs_near(demos: Demos) -> dict[str, int]:
@@ -154,20 +278,19 @@ def pairs_near(demos: Demos) -> dict[str, int]:
     -------
     dict
         `pairs`: all marked pairs; `leaving`: those whose state lies on the correct path, so that
-        the pair leaves it; `beside`: those one move away from it.
+        the pair leaves it; in a maze also `beside`: those one move away from it.
     """
-    maze = demos.environment
-    shape = maze.n_states, maze.n_actions
+    world = demos.environment
+    shape = world.n_states, world.n_actions
     marked = visited(demos.incorrect, shape=shape) & ~visited(demos.correct, shape=shape)
-    on_path = np.zeros(maze.n_states, dtype=bool)
+    on_path = np.zeros(world.n_states, dtype=bool)
     for demo in demos.correct:
         on_path[demo.states] = True
-    beside = on_path[maze.next_state].any(axis=1) & ~on_path
-    return {
-        "pairs": int(marked.sum()),
-        "leaving": int(marked[on_path].sum()),
-        "beside": int(marked[beside].sum()),
-    }
+    counts = {"pairs": int(marked.sum()), "leaving": int(marked[on_path].sum())}
+    if isinstance(world, Maze):
+        beside = on_path[world.next_state].any(axis=1) & ~on_path
+        counts["beside"] = int(marked[beside].sum())
+    return counts
 
 
 def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
@@ -178,18 +301,16 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
         _interval(*row) for row in zip(table["mean"], table["low"], table["high"], strict=True)
     ]
     readable["SD"] = table["sd"].map(_number)
-    readable["Median (quartiles)"] = [
-        f"{m:g} ({a:g}–{b:g})"
-        for m, a, b in zip(table["median"], table["quartile_1"], table["quartile_3"], strict=True)
-    ]
+    readable["Median (quartiles)"] = _quartiles(table)
     readable["At the cap"] = [
         f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
     ]
     if "paper_mean" in table:
         readable["Paper: mean (SD)"] = [
-            "–" if np.isnan(mean) else f"{mean:.2f} ({sd:.2f})"
+            "–" if np.isnan(mean) else f"{mean:.2f} ({_number(sd)})"
             for mean, sd in zip(table["paper_mean"], table["paper_sd"], strict=True)
         ]
+    if "predicted_low" in table:
         readable["Predicted mean"] = [
             "–" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
             for low, high in zip(table["predicted_low"], table["predicted_high"], strict=True)
@@ -198,19 +319,14 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def readable_claims(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of claims as a reader wants it."""
+    """Return a table of claims as a reader wants it: the effect that each claim is about."""
     readable = table[["claim", "place"]].rename(columns={"claim": "Claim", "place": "Place"})
     readable["F"] = table["F"].map(F_LABELS)
-    readable["Difference [95 %]"] = [
-        _interval(*row)
-        for row in zip(table["difference"], table["low"], table["high"], strict=True)
-    ]
-    readable["Paper"] = table["paper_difference"].map(_number)
+    readable["Effect [95 %]"] = [_effect(row) for row in table.itertuples()]
+    readable["Paper"] = table["paper_effect"].map(_number)
     readable["P(fewer)"] = table["fewer"].map(_number)
-    readable["SD ratio"] = table["sd_ratio"].map(_number)
-    readable["p (Holm)"] = [
-        f"{p} ({h})" for p, h in zip(table["p"].map(_p), table["p_holm"].map(_p), strict=True)
-    ]
+    readable["p"] = table["p"].map(_p)
+    readable["p, Holm"] = table["p_holm"].map(_p)
     readable["Power"] = [
         "–" if judged == "steadier" else _number(power)
         for power, judged in zip(table["power"], table["judged"], strict=True)
@@ -242,13 +358,20 @@ def findings(table: pd.DataFrame) -> str:
     """Return a table of claims in words, as a Markdown list."""
     lines = []
     for row in table.itertuples():
-        numbers = f"{_number(row.sd_ratio)} times the SD"
-        if row.judged == "fewer":
-            numbers = f"difference {_interval(row.difference, row.low, row.high)}"
-            if not np.isnan(row.paper_difference):
-                numbers += f", in the paper {row.paper_difference:.2f}"
-        numbers += f"; p {_p(row.p)}, after Holm {_p(row.p_holm)}"
+        paper = "" if np.isnan(row.paper_effect) else f", in the paper {row.paper_effect:.2f}"
+        numbers = f"{_effect(row)}{paper}; p {_p(row.p)}, after Holm {_p(row.p_holm)}"
         lines.append(f"- **{row.verdict}** with {F_LABELS[row.F]}: {row.claim} ({numbers}).\n")
+    return "".join(lines)
+
+
+def findings_of_sets(table: pd.DataFrame) -> str:
+    """Return in words which sets of incorrect demonstrations change the number of iterations."""
+    lines = []
+    for f, part in table[table["verdict"] != ""].groupby("F", sort=False):
+        by_verdict = part.groupby("verdict", sort=False)["set"].agg(", ".join)
+        said = "; ".join(f"**{verdict}** for {sets}" for verdict, sets in by_verdict.items())
+        begin = f"With {F_LABELS[f]}, that" if f else "That"
+        lines.append(f"- {begin} incorrect demonstrations save iterations is {said}.\n")
     return "".join(lines)
 
 
@@ -277,6 +400,20 @@ def write_trials(trials: pd.DataFrame, path: Path) -> Path:
 
 def _interval(middle: float, low: float, high: float) -> str:
     return "–" if np.isnan(middle) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _quartiles(table: pd.DataFrame) -> list[str]:
+    return [
+        f"{m:g} ({a:g}–{b:g})"
+        for m, a, b in zip(table["median"], table["quartile_1"], table["quartile_3"], strict=True)
+    ]
+
+
+def _effect(row: Any) -> str:
+    """Return the mean difference, or the ratio of SDs, with its interval."""
+    if row.judged == "fewer":
+        return _interval(row.difference, row.low, row.high)
+    return f"SD × {_interval(row.sd_ratio, row.sd_low, row.sd_high)}"
 
 
 def _number(x: float) -> str:

@@ -54,6 +54,10 @@ class Results:
         """Return the number of iterations of every trial, `[trial]`."""
         return np.array([self.trial(setting, k).iterations for k in range(self.trials)])
 
+    def converged(self, setting: Setting) -> NDArray[np.bool_]:
+        """Return whether each trial converged, `[trial]`."""
+        return np.array([self.trial(setting, k).converged for k in range(self.trials)])
+
     def frame(self) -> pd.DataFrame:
         """Return tidy trials, one row for each trial of each setting."""
         rows = []

@@ -12,6 +12,7 @@ import pytest
 
 from replication import params
 from replication.choices import Choice, ChoiceError, Chosen, register, unknown_name
+from replication.envs.soccer import SoccerParams
 from replication.paths import PROJECT
 
 ENTRIES = list(register().values())
@@ -52,8 +53,8 @@ def test_fields_and_entries_match() -> None:
     """Each field of a parameter dataclass is one entry's field, and the other way round."""
     declared = {
         f"{kind.__name__}.{field.name}": field.metadata.get("choice")
-        for kind in CLASSES
-        for field in dataclasses.fields(kind)  # type: ignore[arg-type] # they are dataclasses
+        for kind in (*CLASSES, SoccerParams)
+        for field in dataclasses.fields(kind)
     }
     assert declared == {entry.field: entry.id for entry in ENTRIES if entry.field}
 

@@ -15,10 +15,21 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 from typer.testing import CliRunner, Result
 
-from replication import Fit, MazeError, cli, paths, regenerate, save_demos
+from replication import (
+    Fit,
+    Maze,
+    MazeError,
+    cli,
+    demonstrate,
+    load_demos,
+    paths,
+    regenerate,
+    save_demos,
+)
 from replication.choices import register
 from replication.demos import Demos, json_schema
 from replication.irl import METHODS
+from replication.params import Expert
 
 
 def replicate(*words: str | Path) -> Result:
@@ -72,11 +83,51 @@ def test_run_writes_shows_and_tells(project: Path) -> None:
     result = replicate("run", "--profile", "quick", *words)
     assert result.exit_code == 0
     table = "| -4 | 'x=y' | 9 | 2 |"
-    assert (project / "build" / "quick" / "seen.md").read_text() == table
+    assert (project / "build" / "custom" / "seen.md").read_text() == table
     assert table in result.stdout
-    assert str(project / "build" / "quick") in result.stdout
-    assert str(project / "build" / "executed" / "quick") in result.stdout
+    assert f"outputs (1): {project / 'build' / 'custom'}\n" in result.stdout
+    assert str(project / "build" / "executed" / "custom") in result.stdout
     assert not (project / "figures").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "folder"),
+    [
+        ([], "figures"),
+        (["-p", "jobs", "2"], "figures"),
+        (["--profile", "quick"], "build/quick"),
+        (["--seed", "1"], "build/custom"),
+        (["-p", "trials", "3"], "build/custom"),
+    ],
+)
+def test_only_the_paper_as_it_is_goes_to_figures(
+    project: Path, words: list[str], folder: str
+) -> None:
+    """A run that may give other results than the profile's has a folder of its own."""
+    assert replicate("run", *words, "--jobs", "1").exit_code == 0
+    assert [path.parent for path in project.rglob("seen.md")] == [project / folder]
+    assert len(list(project.rglob("build/executed/*/toy.ipynb"))) == 1
+
+
+def test_claims_are_shown_last(project: Path) -> None:
+    """Each table has its name, those of claims stand at the end, and shared files count once."""
+    for name in ("a", "b"):
+        tables = [f"{name}.md", f"{name}_claims.md"]
+        cells = [
+            new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
+            new_code_cell(
+                f"from pathlib import Path\nfor name in {[*tables, 'trials.csv']}:\n"
+                "    (Path(out) / name).write_text(f'| {name} |\\n')"
+            ),
+        ]
+        declared = {"outputs": tables, "merged": ["trials.csv"]}
+        node = new_notebook(cells=cells, metadata={"replication": declared})
+        nbformat.write(node, project / "notebooks" / f"{name}.ipynb")
+    shown = replicate("run", "a", "b").stdout
+    titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
+    names = ["a.md", "b.md", "a_claims.md", "b_claims.md"]
+    assert titles == [(name, name) for name in names]
+    assert "\noutputs (5): " in shown
 
 
 def test_failing_cell_shows_its_traceback(project: Path) -> None:
@@ -104,8 +155,22 @@ def test_run_refuses_in_one_line(project: Path) -> None:
     assert "use --out" in refused("run", "-p", "out", "x")
     figures = project / "figures"
     assert "profile 'paper'" in refused("run", "--profile", "quick", "--out", figures)
+    assert "a run with -p trials" in refused("run", "-p", "trials", "3", "--out", figures)
+    assert "a run with --seed" in refused("run", "--seed", "1", "--out", figures)
     (project / "notebooks" / "toy.ipynb").unlink()
     assert "there is no notebook in" in refused("run")
+
+
+def test_refusal_in_a_cell_is_one_line(project: Path) -> None:
+    """A file or choice that only the notebook sees to be wrong has no traceback, and code 2."""
+    path = project / "notebooks" / "toy.ipynb"
+    node = nbformat.read(path, as_version=4)
+    node.cells[1].source = "from replication import load_demos\nload_demos(name)"
+    nbformat.write(node, path)
+    result = replicate("run", "-p", "name", "none.json")
+    assert result.exit_code == 2
+    line = r"error: .*toy\.ipynb: none\.json: cannot be read \(no such file or directory\)\n"
+    assert re.fullmatch(line, result.stderr)
 
 
 @pytest.mark.parametrize(
@@ -211,6 +276,7 @@ def test_learn_refuses_in_one_line(demo_file: Path, tmp_path: Path) -> None:
     assert "no incorrect demo of kind 'speed'" in refused(
         "learn", demo_file, "--incorrect", "speed"
     )
+    assert "with --incorrect" in refused("learn", demo_file, "-p", "incorrect", "hit")
     words = ["--method", "unified", "--incorrect", "hit"]
     assert "uses no incorrect demos" in refused("learn", demo_file, *words)
     assert "nothing.json" in refused("learn", tmp_path / "nothing.json")
@@ -242,8 +308,43 @@ def test_check_shows_warnings(demo_file: Path) -> None:
     demo_file.write_text(json.dumps(document))
     result = replicate("demos", "check", demo_file)
     assert result.exit_code == 0
-    assert f"{demo_file}: warning: " in result.stdout
-    assert ": ok" not in result.stdout
+    lines = result.stdout.splitlines()
+    assert all(line.startswith(f"warning: {demo_file}: the correct demos ") for line in lines)
+    assert len(lines) == 2
+
+
+def test_make_writes_what_the_expert_drives(tmp_path: Path) -> None:
+    """The file holds the demonstrations of the map, with the registered or the given rules."""
+    text = ".......\n.....G.\n.......\n.......\n.S.....\n.......\n"
+    drawn, out = tmp_path / "map.txt", tmp_path / "new" / "mine.json"
+    drawn.write_text(f"\ufeff\n{text}", encoding="utf-8")
+    for params, words in (
+        (Expert(), []),
+        (Expert(leg=2, detour_width=1), ["--leg", "2", "--detour-width", "1"]),
+    ):
+        result = replicate("demos", "make", drawn, "--task", "mine", "--out", out, *words)
+        assert result.exit_code == 0
+        made = load_demos(out)
+        assert made == demonstrate("mine", Maze.from_text(text), params=params)
+        assert all(kind in result.stdout for kind in made.kinds)
+        assert str(out) in result.stdout
+
+
+def test_make_refuses_in_one_line(tmp_path: Path) -> None:
+    """Maps, rules, names and files that cannot be used have one line each; nothing is written."""
+    drawn, out = tmp_path / "map.txt", tmp_path / "mine.json"
+    drawn.write_text("S.G")
+    rest: list[str | Path] = ["--task", "mine", "--out", out]
+    assert "choice DEMO-SHAPE" in refused("demos", "make", drawn, *rest, "--leg", "0")
+    assert "DETOUR-WIDTH" in refused("demos", "make", drawn, *rest, "--detour-width", "-1")
+    assert "none.txt: no such file" in refused("demos", "make", tmp_path / "none.txt", *rest)
+    assert "letters, digits" in refused("demos", "make", drawn, "--task", "a b", "--out", out)
+    assert "cannot be written" in refused(
+        "demos", "make", drawn, "--task", "mine", "--out", tmp_path
+    )
+    drawn.write_bytes(b"S.\xffG")
+    assert "map.txt: unknown character" in refused("demos", "make", drawn, *rest)
+    assert not out.exists()
 
 
 def test_schema_is_printed() -> None:
@@ -295,6 +396,13 @@ def test_help_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_help_knows_every_method() -> None:
+    """The methods that the help of `learn` names are those of the registry."""
+    shown = "".join(replicate("learn", "--help").stdout.split())
+    for name in METHODS:
+        assert name in re.split(r"METHOD|\.|,|or(?=unified)", shown)
 
 
 def test_time_limit_has_one_default() -> None:

@@ -69,6 +69,7 @@ def test_worked_example() -> None:
     assert fields.task == "tiny"
     assert fields.description == "Käse\n"
     assert fields.environment.build() == Maze(("S.#", "..G"))
+    assert isinstance(fields.environment, MazeFields)
     assert fields.environment.start is None
     assert fields.correct[0].states == EXAMPLE["correct"][0]["states"]
     assert fields.incorrect[1].actions == ["down", "right", "right"]
@@ -78,7 +79,7 @@ def test_worked_example() -> None:
 
 def test_environment_is_described_in_full() -> None:
     """A maze's description names its actions, start and goal, and builds the same maze."""
-    described = MazeFields.describe(Maze(("S.#", "..G")))
+    described = Maze(("S.#", "..G")).describe()
     assert described == {
         "kind": "maze",
         "map": ["S.#", "..G"],
@@ -123,7 +124,7 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
     ),
     "environment": (
         [(("environment", "kind"), "tank")],
-        "environment.kind: 'tank' does not fit: input",
+        "environment.kind: unknown kind 'tank'; the kinds are maze, soccer",
     ),
     "no environment": ([(("environment",), ...)], "the field 'environment' is missing"),
     "not rectangular": (
@@ -185,9 +186,9 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
         [(("correct", 0, "states", 1, 1), -1)],
         "-1 does not fit: input should be grea",
     ),
-    "state of three": (
-        [(("correct", 0, "states", 1), [0, 1, 0])],
-        "[0, 1, 0] does not fit: list sho",
+    "state of four": (
+        [(("correct", 0, "states", 1), [0, 1, 0, 0])],
+        "[0, 1, 0, 0] does not fit: list sho",
     ),
     "large": (
         [(("correct", 0, "states", 1, 1), 10**15)],
@@ -234,7 +235,7 @@ def test_schema_agrees_with_the_program() -> None:
     validator = jsonschema.Draft202012Validator(json_schema())
     validator.check_schema(json_schema())
     assert validator.is_valid(EXAMPLE)
-    for case in ("misspelt", "no kind", "kind", "version", "state of three"):
+    for case in ("misspelt", "no kind", "kind", "version", "state of four"):
         changes, _ = REFUSALS[case]
         assert not validator.is_valid(edited(*changes))
     assert not validator.is_valid(edited((("correct",), [])))

@@ -236,9 +236,21 @@ def test_two_actions_in_one_state_are_a_warning(write: Callable[[Any], Path]) ->
 def test_two_trajectories_are_a_warning(write: Callable[[Any], Path]) -> None:
     """Different correct demos are read, with a warning that mu_E is an average."""
     other = {"name": "c2", "actions": ["down", "right", "right"]}
-    first, second = check_demos(write(edited((("correct", 1), other))))
+    changes = ((("correct", 1), other), (("incorrect", 1), ...))
+    first, second = check_demos(write(edited(*changes)))
     assert "'down' and 'right' in [0,0]" in first
     assert "2 different trajectories: mu_E is their average" in second
+
+
+def test_incorrect_demo_without_effect_is_a_warning(write: Callable[[Any], Path]) -> None:
+    """An incorrect demo that marks no pair of its own is named, and only such a one."""
+    early = {"name": "early", "kind": "stop", "actions": ["right", "down"]}
+    path = write(edited((("incorrect", 3), early)))
+    with pytest.warns(DemoWarning, match="incorrect demo 'early' has no effect") as caught:
+        load_demos(path)
+    assert [str(one.message) for one in caught] == check_demos(path)
+    late = early | {"actions": ["right", "down", "down"]}
+    assert check_demos(write(edited((("incorrect", 3), late)))) == []
 
 
 # --- writing ---------------------------------------------------------------------------------
@@ -391,7 +403,7 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
     ),
     "misses the goal": (
         [(("correct", 0, "actions", 2), ...), (("correct", 0, "states", 3), ...)],
-        "demo 'c' is correct, but ends at [1,1], not at the goal [1,2]; add the missing steps or",
+        "demo 'c' is correct, but ends at [1,1] and misses the goal [1,2]; add the missing steps",
     ),
     "same name": (
         [(("incorrect", 1, "name"), "c")],

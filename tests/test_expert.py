@@ -72,7 +72,7 @@ def cost(actions: list[int], leg: int) -> int:
 def test_stored_files_follow_from_the_rules(name: str) -> None:
     """A stored file is what the expert makes of its map with the registered parameters."""
     stored = load_demos(PROJECT / "data" / "demos" / f"{name}.json")
-    made = demonstrate(stored.task, stored.environment, description=stored.description)
+    made = demonstrate(stored.task, stored.maze, description=stored.description)
     assert made == stored
 
 
@@ -80,13 +80,13 @@ def test_stored_correct_demonstrations_are_the_papers_shortest_paths(stored_demo
     """31 and 33 moves, as the paper says, and no way in the map is shorter."""
     (correct,) = stored_demos.correct
     assert len(correct.actions) == MOVES[stored_demos.task]
-    assert len(correct.actions) == shortest(stored_demos.environment.rows)
+    assert len(correct.actions) == shortest(stored_demos.maze.rows)
 
 
 def test_stored_mazes_share_start_and_goal() -> None:
     """Both mazes have 20 x 20 cells, the same start and the same goal; one has no obstacles."""
     one, other = (
-        load_demos(PROJECT / "data" / "demos" / f"{name}.json").environment
+        load_demos(PROJECT / "data" / "demos" / f"{name}.json").maze
         for name in ("open_maze", "obstacle_maze")
     )
     assert one.shape == other.shape == (20, 20)
@@ -170,7 +170,7 @@ def test_demonstrations_of_the_stored_mazes(stored_demos: Demos) -> None:
 
 def check_kinds(demos: Demos) -> None:
     """Assert what tells each kind of incorrect demonstration."""
-    maze, (correct,) = demos.environment, demos.correct
+    maze, (correct,) = demos.maze, demos.correct
     actions = correct.actions.tolist()
     corners = [t for t, (a, b) in enumerate(pairwise(actions), start=1) if a != b]
     for demo in demos.incorrect:

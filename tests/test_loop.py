@@ -21,6 +21,7 @@ class Corridor:
     """Five cells in a row, solved exactly; it counts its calls."""
 
     shape: tuple[int, int] = (5, 2)
+    together: int = 1
     calls: int = 0
 
     def learn(

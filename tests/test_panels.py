@@ -84,7 +84,7 @@ def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, results: Res
 
 def test_cells_count_from_the_lower_left(small_demos: Demos) -> None:
     """In the numbers, as in the figures, x goes right and y goes up; obstacles are left out."""
-    maze = small_demos.environment
+    maze = small_demos.maze
     table = surface_numbers(maze, {"state": np.arange(maze.n_states, dtype=float)})
     assert len(table) == maze.free.sum()
     start = table[table["state"] == maze.start].iloc[0]

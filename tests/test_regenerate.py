@@ -16,7 +16,7 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from replication import paths, regenerate
+from replication import Demos, paths, regenerate
 from replication.notebooks import NotebookError
 from replication.regenerate import RunError, run_notebooks
 
@@ -125,9 +125,28 @@ def test_quick_results_never_go_to_figures(
     """Only the profile `paper` may write to the project's figures, by whatever path."""
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     (tmp_path / "link").symlink_to(tmp_path / "figures")
-    for folder in ("figures", "figures/../figures", "link"):
+    for folder in ("figures", "figures/../figures", "link", "figures/below"):
         with pytest.raises(NotebookError, match="holds the results of the profile 'paper'"):
             run(write(), profile="quick", out=tmp_path / folder)
+
+
+def test_changed_results_never_go_to_figures(
+    write: Write, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What changes no result may be set in a run into the figures, anything else may not."""
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    path = write("(folder / 'a').touch()", outputs=["a"], parameters=f"{PARAMETERS}\nstore = ''")
+    assert run(path, parameters={"store": "x", "jobs": 1}) == [tmp_path / "figures" / "a"]
+    for options, named in (
+        ({"seed": 1}, "with --seed$"),
+        ({"parameters": {"trials": 3}}, "with -p trials$"),
+        (
+            {"profile": "quick", "seed": 1, "parameters": {"trials": 3, "jobs": 1}},
+            "with --profile quick, -p trials, --seed$",
+        ),
+    ):
+        with pytest.raises(NotebookError, match=named):
+            run(path, **options)
 
 
 # --- a run that succeeds ---------------------------------------------------------------------
@@ -173,7 +192,7 @@ def test_run_publishes_what_is_declared(
     assert "1 output in" in lines[1]
     assert os.environ["JUPYTER_PATH"] == str(tmp_path / "jupyter")
 
-    executed = (tmp_path / "executed" / "quick" / "toy.ipynb").read_text()
+    executed = (tmp_path / "executed" / "custom" / "toy.ipynb").read_text()
     node = nbformat.reads(executed, as_version=4)
     assert [output.text for output in node.cells[-1].outputs] == [
         f"{tmp_path / 'figures'}\n",
@@ -183,7 +202,7 @@ def test_run_publishes_what_is_declared(
     assert not re.search(r"scratch|\d\d:\d\d:\d\d", executed)
 
     run(path, profile="quick", seed=5, parameters={"choices": choices})
-    assert (tmp_path / "executed" / "quick" / "toy.ipynb").read_text() == executed
+    assert (tmp_path / "executed" / "custom" / "toy.ipynb").read_text() == executed
 
 
 def test_merged_file_is_there_when_the_notebook_starts(
@@ -195,8 +214,11 @@ def test_merged_file_is_there_when_the_notebook_starts(
         write(append, name=name, parameters=f'out = "build"\nname = "{name}"', merged=["rows.csv"])
         for name in ("one", "two")
     ]
-    published = run(*notebooks, jobs=None)
+    lines: list[str] = []
+    published = run(*notebooks, jobs=None, echo=lines.append)
+    assert published == [tmp_path / "figures" / "rows.csv"]
     assert published[0].read_text() == "one\ntwo\n"
+    assert "two: 0 outputs and rows of rows.csv in" in lines[-1]
     with pytest.raises(RunError, match=r"declared but not written: rows\.csv"):
         run(write(merged=["rows.csv"]))
     assert published[0].read_text() == "one\ntwo\n"
@@ -230,6 +252,38 @@ def test_failure_leaves_earlier_outputs(
     assert list(earlier.parent.iterdir()) == [earlier]
     assert (tmp_path / "executed" / "paper" / "toy.ipynb").exists()
     assert ("KeyError" in caught.value.details) == ("KeyError" in code)
+
+
+@pytest.mark.parametrize("ename", sorted(regenerate.MISTAKES))
+def test_refusal_in_a_cell_is_the_users_mistake(
+    write: Write, run: Run, tmp_path: Path, ename: str
+) -> None:
+    """What the package refuses in a cell is told as before a run, and nothing is published."""
+    module = {"ChoiceError": "choices", "DemoError": "demos", "MazeError": "envs"}[ename]
+    code = f"from replication.{module} import {ename}\nraise {ename}('wrong\\nmore')"
+    path = write("(folder / 'a').touch()", code, outputs=["a"])
+    with pytest.raises(NotebookError, match=r"toy\.ipynb: wrong$"):
+        run(path)
+    assert list((tmp_path / "figures").iterdir()) == []
+    assert (tmp_path / "executed" / "paper" / "toy.ipynb").exists()
+
+
+def test_missing_kind_comes_with_a_mend(write: Write, run: Run, small_demos: Demos) -> None:
+    """The option that takes the kinds of a file is shown, beside the choices that were made."""
+    code = f"Demos('t', Maze({small_demos.maze.rows!r}), [Demo('c', 'correct', "
+    correct = small_demos.correct[0]
+    code += f"{correct.states.tolist()}, {correct.actions.tolist()})]).select('hit')"
+    path = write("from replication import Demo, Demos, Maze", code)
+    for given, shown in (
+        ({}, '{"incorrect": "all"}'),
+        ({"choices": {"alpha": 0.1, "incorrect": "hit"}}, '{"alpha": 0.1, "incorrect": "all"}'),
+    ):
+        message = f"use all, none, such as -p choices '{shown}'"
+        with pytest.raises(NotebookError, match=f"{re.escape(message)}$"):
+            run(path, parameters=given)
+    path = write("from replication import Demo, Demos, Maze", code, parameters='out = "x"')
+    with pytest.raises(NotebookError, match=r"use all, none$"):
+        run(path, jobs=None)
 
 
 def test_first_failure_stops_the_rest(write: Write, run: Run, tmp_path: Path) -> None:

@@ -177,9 +177,9 @@ def test_rays_by_hand() -> None:
 
 def test_front_rays() -> None:
     """Over half a circle the rays see what is ahead and not what is behind."""
-    angles = SoccerParams(ray_arc=180.0).ray_angles
+    angles = SoccerParams(ray_arc=180).ray_angles
     assert (len(angles), angles[0], angles[-1]) == pytest.approx((15, -math.pi / 2, math.pi / 2))
-    front, around = SoccerWorld(SoccerParams(ray_arc=180.0)), SoccerWorld()
+    front, around = SoccerWorld(SoccerParams(ray_arc=180)), SoccerWorld()
     x, y, _ = front.obstacles[0]
     for heading, ahead in ((0.0, True), (math.pi, False)):
         for world, sees in ((front, ahead), (around, True)):
@@ -322,7 +322,7 @@ def test_params_are_checked(name: str, value: float) -> None:
 VARIANTS: tuple[dict[str, Any], ...] = (
     {},
     {"ray_arc": 180.0},
-    {"macro_step": True, "time_limit": 60.0},
+    {"macro": "cell", "time_limit": 60.0},
     {"drive_time": 0.4, "dt": 0.025, "rays": 7},
 )
 
@@ -481,10 +481,10 @@ def tables(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
 
 
 @pytest.mark.parametrize("random_ties", [True, False])
-@pytest.mark.parametrize("macro_step", [True, False])
-def test_learning_is_the_reference(random_ties: bool, macro_step: bool) -> None:
+@pytest.mark.parametrize("macro", ["cell", "decision"])
+def test_learning_is_the_reference(random_ties: bool, macro: str) -> None:
     """Learning returns the bits of the plain loop: Q, the stream and the number of decisions."""
-    params = SoccerParams(time_limit=40.0, macro_step=macro_step)
+    params = SoccerParams(time_limit=40.0, macro=macro)
     options: dict[str, Any] = {
         "episodes": 12,
         "beta": 0.6,

@@ -13,6 +13,7 @@ from replication.statistics import (
     NOT_TESTABLE,
     REPRODUCED,
     REVERSED,
+    UNDECIDED,
     Comparison,
     compare,
     holm,
@@ -25,7 +26,7 @@ from replication.statistics import (
 )
 
 COUNTS = st.lists(st.integers(0, 300), min_size=2, max_size=12)
-NEUTRAL = Comparison(0.0, -1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 0.5)
+NEUTRAL = Comparison(0.0, -1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 0.8, 1.2, 1.0, 0.5, n=100)
 NAN = float("nan")
 
 
@@ -83,8 +84,8 @@ def test_a_sample_does_not_differ_from_itself(x: list[int]) -> None:
     found = compare(x, x, published=-4.8)
     assert (found.difference, found.low, found.high, found.fewer) == (0.0, 0.0, 0.0, 0.5)
     assert (found.p_welch, found.p_wilcoxon) == (1.0, 1.0)
-    assert verdict_fewer(found) == NOT_REPRODUCED
-    assert verdict_steadier(found) in (NOT_REPRODUCED, NOT_TESTABLE)
+    assert verdict_fewer(replace(found, n=100), found.p_wilcoxon) == NOT_REPRODUCED
+    assert verdict_steadier(found, found.p_spread) == NOT_TESTABLE
 
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(0, 300)), min_size=2, max_size=12))
@@ -104,17 +105,19 @@ def test_samples_that_do_not_spread() -> None:
     """Constant samples have no spread to compare, and a constant difference is its interval."""
     found = compare([3, 3, 3], [4, 4, 4], published=-1.0)
     assert (found.difference, found.low, found.high, found.fewer) == (-1.0, -1.0, -1.0, 1.0)
-    assert np.isnan([found.sd_ratio, found.p_spread, found.power]).all()
+    assert np.isnan([found.sd_ratio, found.sd_low, found.sd_high, found.p_spread]).all()
+    assert np.isnan(found.power)
     assert found.p_welch == 0.0
-    assert verdict_fewer(found) == REPRODUCED
-    assert verdict_steadier(found) == NOT_TESTABLE
+    assert verdict_steadier(found, found.p_spread) == NOT_TESTABLE
 
 
 def test_capped_comparison_is_not_testable() -> None:
     """With a trial at the cap every statistic is NaN, and so is each verdict not testable."""
     found = compare([1, 2, 300], [4, 5, 6], capped=True, published=-4.8)
-    assert np.isnan(astuple(found)).all()
-    assert verdict_fewer(found) == verdict_steadier(found) == NOT_TESTABLE
+    assert np.isnan(astuple(found)[:-1]).all()
+    assert found.n == 3
+    for verdict in (verdict_fewer, verdict_steadier):
+        assert verdict(replace(found, n=100), 0.001) == NOT_TESTABLE
 
 
 # --- intervals -------------------------------------------------------------------------------
@@ -178,69 +181,74 @@ def test_prediction_interval_of_the_paper() -> None:
 @pytest.mark.parametrize(("n", "effect"), [(10, 0.5), (30, 0.3), (100, -0.3)])
 def test_power_by_simulation(n: int, effect: float) -> None:
     """The power is the share of simulated paired t-tests that reject."""
-    sample = np.resize([-1.0, 1.0], n)
     rng = np.random.default_rng(3)
-    draws = rng.normal(effect, sample.std(ddof=1), (10_000, n))
+    draws = rng.normal(effect, 1.25, (10_000, n))
     rejected = (stats.ttest_1samp(draws, 0.0, axis=1).pvalue < 0.05).mean()
-    assert power(sample, effect) == pytest.approx(rejected, abs=0.02)  # four standard errors
+    assert power(1.25, n, effect) == pytest.approx(rejected, abs=0.02)  # four standard errors
 
 
 def test_power_without_an_effect_is_the_level() -> None:
     """Where nothing differs, one test in twenty rejects."""
-    assert power(np.array([1.0, 5.0, 2.0, 0.0]), 0.0) == pytest.approx(0.05)
+    assert power(2.0, 4, 0.0) == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("n", [2, 10, 100])
 def test_power_rises_with_the_effect_to_one(n: int) -> None:
     """The larger the effect the larger the power, its sign does not matter, far out it is 1."""
-    sample = np.resize([-1.0, 1.0], n)
-    powers = [power(sample, effect) for effect in np.linspace(0.0, 60.0, 241)]
+    powers = [power(1.2, n, effect) for effect in np.linspace(0.0, 60.0, 241)]
     assert np.diff(powers).min() >= -1e-12
     assert powers[-1] > 0.99
-    assert power(sample, -0.4) == power(sample, 0.4)
-    assert power(sample, 1e4) == pytest.approx(1.0)
+    assert power(1.2, n, -0.4) == power(1.2, n, 0.4)
+    assert power(1.2, n, 1e4) == pytest.approx(1.0)
 
 
 def test_power_needs_an_effect_and_a_spread() -> None:
     """Without a published effect, or without any spread, there is no power."""
-    assert np.isnan(power(np.array([1.0, 2.0]), NAN))
-    assert np.isnan(power(np.array([2.0, 2.0]), 1.0))
+    assert np.isnan(power(1.0, 2, NAN))
+    assert np.isnan(power(0.0, 2, 1.0))
 
 
 # --- verdicts --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "due"),
+    ("low", "high", "p", "due"),
     [
-        (-2.0, -1e-9, REPRODUCED),
-        (-2.0, 0.0, NOT_REPRODUCED),
-        (-1.0, 1.0, NOT_REPRODUCED),
-        (0.0, 0.0, NOT_REPRODUCED),
-        (0.0, 2.0, NOT_REPRODUCED),
-        (1e-9, 2.0, REVERSED),
+        (-2.0, -1e-9, 0.0499, REPRODUCED),
+        (-2.0, -1e-9, 0.0501, UNDECIDED),
+        (-2.0, 0.0, 0.0499, UNDECIDED),
+        (-2.0, 0.0, 0.0501, NOT_REPRODUCED),
+        (0.0, 0.0, 1.0, NOT_REPRODUCED),
+        (1e-9, 2.0, 0.0499, REVERSED),
+        (1e-9, 2.0, 0.0501, UNDECIDED),
+        (NAN, NAN, 0.001, NOT_TESTABLE),
+        (-2.0, -1.0, NAN, NOT_TESTABLE),
     ],
 )
-def test_verdict_on_means_at_its_borders(low: float, high: float, due: str) -> None:
-    """The whole interval has to lie on one side; an end at zero does not."""
-    assert verdict_fewer(replace(NEUTRAL, low=low, high=high)) == due
-    assert verdict_fewer(replace(NEUTRAL, difference=NAN, low=low, high=high)) == NOT_TESTABLE
+def test_verdict_needs_both_locks(low: float, high: float, p: float, due: str) -> None:
+    """The whole interval lies on one side and the test rejects; else it is undecided."""
+    assert verdict_fewer(replace(NEUTRAL, low=low, high=high), p) == due
+    ratio = replace(NEUTRAL, sd_low=1 + low / 10, sd_high=1 + high / 10)
+    assert verdict_steadier(ratio, p) == due
 
 
-@pytest.mark.parametrize(
-    ("ratio", "p", "due"),
-    [
-        (0.5, 0.0499, REPRODUCED),
-        (0.5, 0.0501, NOT_REPRODUCED),
-        (2.0, 0.0499, REVERSED),
-        (2.0, 0.0501, NOT_REPRODUCED),
-        (0.999, 0.0, REPRODUCED),
-        (NAN, NAN, NOT_TESTABLE),
-    ],
-)
-def test_verdict_on_spread_at_its_borders(ratio: float, p: float, due: str) -> None:
-    """The test has to reject at 5 %, and the ratio says in which direction."""
-    assert verdict_steadier(replace(NEUTRAL, sd_ratio=ratio, p_spread=p)) == due
+def test_few_trials_get_no_verdict() -> None:
+    """Below 30 trials nothing is judged, however clear it looks."""
+    clear = replace(NEUTRAL, low=-3.0, high=-2.0, sd_low=0.1, sd_high=0.2)
+    assert verdict_fewer(replace(clear, n=30), 0.001) == REPRODUCED
+    assert verdict_fewer(replace(clear, n=29), 0.001) == NOT_TESTABLE
+    assert verdict_steadier(replace(clear, n=29), 0.001) == NOT_TESTABLE
+
+
+def test_ratio_of_sds_has_an_interval_that_knows_the_pairs() -> None:
+    """Of samples that are multiples of each other the ratio is exact; of noise it is wide."""
+    rng = np.random.default_rng(2)
+    sample = rng.normal(40.0, 5.0, 100)
+    exact = compare(2 * sample, sample)
+    assert (exact.sd_low, exact.sd_high) == pytest.approx((2.0, 2.0))
+    noise = compare(rng.normal(40.0, 10.0, 100), sample)
+    assert noise.sd_low < noise.sd_ratio < noise.sd_high
+    assert 1.4 < noise.sd_low < 2.0 < noise.sd_high < 3.0
 
 
 # --- Holm ------------------------------------------------------------------------------------

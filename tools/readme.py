@@ -1,4 +1,4 @@
-"""Write the claims table of README.md from the files in figures/; with `--check` only compare."""
+"""Write the results in README.md from the files in figures/; with `--check` only compare."""
 
 from __future__ import annotations
 
@@ -8,23 +8,34 @@ import pandas as pd
 
 from replication.files import write_file
 from replication.paths import PROJECT
-from replication.tables import markdown, readable_claims
+from replication.tables import findings_of_sets, markdown, readable_claims
 
 BEGIN = "<!-- results: written by `make readme` from figures/, checked by the tests -->\n"
 END = "<!-- end of results -->\n"
-COLUMNS = ["Claim", "Place", "F", "Difference [95 %]", "Paper", "SD ratio", "p (Holm)", "Verdict"]
-MAZES = {"Open maze": "table1_claims.csv", "Maze with obstacles": "table2_claims.csv"}
+COLUMNS = ["Claim", "Place", "F", "Effect [95 %]", "Paper", "p, Holm", "Verdict"]
+CLAIMS = {
+    "Open maze": "table1_claims.csv",
+    "Maze with obstacles": "table2_claims.csv",
+    "Robot soccer": "soccer_claims.csv",
+}
+SETS = {"Open maze": "open_maze_sets.csv", "Maze with obstacles": "obstacle_maze_sets.csv"}
 
 
 def results() -> str:
-    """Return the claims of both mazes as one Markdown table."""
+    """Return the claims on all tasks as one table, and which demonstrations save iterations."""
     parts = []
-    for maze, name in MAZES.items():
-        table = pd.read_csv(PROJECT / "figures" / name)
-        readable = readable_claims(table)[COLUMNS]
-        readable.insert(0, "Maze", maze)
+    for task, name in CLAIMS.items():
+        readable = readable_claims(_stored(name))[COLUMNS]
+        readable.insert(0, "Task", task)
         parts.append(readable)
-    return markdown(pd.concat(parts))
+    sets = [f"{task}:\n\n{findings_of_sets(_stored(name))}" for task, name in SETS.items()]
+    return "\n".join([markdown(pd.concat(parts)), *sets])
+
+
+def _stored(name: str) -> pd.DataFrame:
+    return pd.read_csv(PROJECT / "figures" / name, keep_default_na=False, na_values=[""]).fillna(
+        {"F": "", "verdict": ""}
+    )
 
 
 def main() -> int:

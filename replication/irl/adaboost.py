@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def start(shape: tuple[int, int], params: Update) -> Array:
-    """Return D_1 [state, action], uniform over all pairs."""
+    """Return D_1 [state, action], uniform over all pairs (choice ADABOOST-SPACE)."""
     return np.full(shape, 1.0 / (shape[0] * shape[1]))
 
 
@@ -72,8 +72,12 @@ def update(
         return w + np.sign(residual) * np.arctanh(odds), d
     loss = relative if rule == "graded" else (residual != 0).astype(float)
     error = float(np.clip(np.sum(d * loss), 1e-6, 0.5 - params.adaboost_margin))
-    confidence = 0.5 * np.log((1.0 - error) / error)
-    d_next = d * np.exp(confidence * (2.0 * loss - 1.0))
+    odds = (1.0 - error) / error
+    confidence = 0.5 * np.log(odds)
+    if rule == "graded":
+        d_next = d * np.exp(confidence * (2.0 * loss - 1.0))
+    else:  # the same for 0 and 1; roots, unlike exponentials, have equal bits on all processors
+        d_next = d * np.where(loss == 1.0, np.sqrt(odds), np.sqrt(1.0 / odds))
     d_next /= d_next.sum()
     if rule == "vote":
         return w + confidence * d_next * np.sign(residual), d_next

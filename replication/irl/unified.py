@@ -39,7 +39,7 @@ def update(
     Notes
     -----
     Eq. 8 prints mu_a for the expert's mu_E. Line 13 of Algorithm 2 stands without an `else`, which
-    would overwrite line 12 at once; it is read as the `else` of line 11.
+    would overwrite line 12 at once; it is read as the `else` of line 11 (choice LINE-13).
     """
     residual = mu_e - mu_i  # Eq. 8
     f_next = f + params.alpha * ((residual != 0) - f)  # Eq. 10

@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from replication import Demos, load_demos
+from replication.envs.chipmunk import FastSoccerWorld
+from replication.envs.field import SoccerField
+from replication.envs.soccer import BACKWARD, FORWARD, SLOW, border_distance, decode, expert_action
+from replication.params import SoccerExpert
+from replication.paths import PROJECT
+from replication.soccer_expert import demonstrate_soccer
+
+
+@pytest.fixture(scope="module")
+def demos() -> Demos:
+    """Load the stored demonstrations."""
+    return load_demos(PROJECT / "data" / "demos" / "soccer.json")
+
+
+def _contacts(field: SoccerField, actions: np.ndarray) -> list[bool]:
+    """Return after which decisions the robot has touched something."""
+    world = FastSoccerWorld(field.params)
+    world.reset()
+    touched = []
+    for action in actions:
+        world.step(int(action))
+        touched.append(any(world.contacts))
+    return touched
+
+
+def test_stored_file_is_what_the_expert_does(demos: Demos) -> None:
+    """The rules give the stored demonstrations, name by name and state by state."""
+    made = demonstrate_soccer("soccer", description=demos.description)
+    assert made == demos
+
+
+def test_correct_demo_follows_a_policy(demos: Demos) -> None:
+    """The expert's action is a function of the state, as else d = 0 could not be reached."""
+    (correct,) = demos.correct
+    assert [expert_action(int(s)) for s in correct.states[:-1]] == correct.actions.tolist()
+    assert demos.conflicts() == ()
+
+
+def test_correct_demo_slows_down_touches_nothing_and_scores(demos: Demos) -> None:
+    """It drives slowly where an obstacle is detected and only there, and ends with a goal."""
+    (correct,) = demos.correct
+    detected = [decode(int(state))[2] for state in correct.states[:-1]]
+    assert [action == SLOW for action in correct.actions] == detected
+    assert any(detected)
+    assert not any(_contacts(SoccerField(), correct.actions))
+    assert SoccerField().goal_step(correct.actions) == len(correct.actions)
+
+
+def test_correct_demo_keeps_off_the_borders_of_cells(demos: Demos) -> None:
+    """At each decision the robot is at least 1 mm from any border, so rounding moves no state."""
+    world = FastSoccerWorld()
+    world.reset()
+    for action in demos.correct[0].actions:
+        assert border_distance(*world.pose[:2]) >= 1e-3
+        world.step(int(action))
+
+
+def test_incorrect_demos_are_of_the_papers_four_kinds(demos: Demos) -> None:
+    """There is at least one of each kind, and no two are the same."""
+    assert set(demos.kinds) == {"hit", "detour", "overspeed", "opposite"}
+    drives = [tuple(demo.actions.tolist()) for demo in (*demos.correct, *demos.incorrect)]
+    assert len(set(drives)) == len(drives)
+
+
+def test_hits_end_with_their_first_contact(demos: Demos) -> None:
+    """A hit touches something in its last decision and not before."""
+    for demo in demos.select("hit").incorrect:
+        touched = _contacts(SoccerField(), demo.actions)
+        assert touched[-1]
+        assert not any(touched[:-1])
+
+
+def test_detours_score_later_and_touch_nothing(demos: Demos) -> None:
+    """A detour takes more decisions than the correct demonstration and ends with a goal."""
+    for demo in demos.select("detour").incorrect:
+        assert len(demo.actions) > len(demos.correct[0].actions)
+        assert SoccerField().goal_step(demo.actions) == len(demo.actions)
+        assert not any(_contacts(SoccerField(), demo.actions))
+
+
+def test_overspeed_does_not_slow_down(demos: Demos) -> None:
+    """Where the expert slows down, an overspeeding one goes forward and pays for it."""
+    correct = demos.correct[0].actions
+    for demo in demos.select("overspeed").incorrect:
+        first = int(np.flatnonzero(demo.actions != correct[: len(demo.actions)])[0])
+        assert (correct[first], demo.actions[first]) == (SLOW, FORWARD)
+        assert (demo.actions[first:] == FORWARD).all()
+        assert _contacts(SoccerField(), demo.actions)[-1]
+
+
+def test_opposite_drives_away(demos: Demos) -> None:
+    """After the correct beginning it goes backward only, for as many decisions, at least four."""
+    correct = demos.correct[0].actions
+    for demo in demos.select("opposite").incorrect:
+        back = int((demo.actions == BACKWARD).sum())
+        begin = len(demo.actions) - back
+        assert demo.actions[:begin].tolist() == correct[:begin].tolist()
+        assert back == max(begin, 4)
+
+
+def test_leaving_at_every_decision_gives_more() -> None:
+    """SOCCER-INCORRECT every: more demonstrations of the same kinds, the default's among them."""
+    legs, every = (
+        {tuple(d.actions.tolist()) for d in demonstrate_soccer("s", params=params).incorrect}
+        for params in (SoccerExpert(), SoccerExpert(leave="every"))
+    )
+    assert legs < every
