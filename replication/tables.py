@@ -399,7 +399,9 @@ def write_trials(trials: pd.DataFrame, path: Path) -> Path:
 
 
 def _interval(middle: float, low: float, high: float) -> str:
-    return "–" if np.isnan(middle) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+    if np.isnan(low):
+        return _number(middle)
+    return f"{middle:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def _quartiles(table: pd.DataFrame) -> list[str]:
