@@ -20,8 +20,8 @@ help: ## list the targets
 reproduce: $(VENV)/.ready ## run everything in the paper and judge each claim
 	$(VENV)/bin/replicate run --profile paper
 
-quick: $(VENV)/.ready ## the same with few trials, into build/quick
-	$(VENV)/bin/replicate run --profile quick --out build/quick
+quick: $(VENV)/.ready ## the tasks with few trials, into build/quick
+	$(VENV)/bin/replicate run obstacle_maze open_maze soccer --profile quick --out build/quick
 
 test: $(VENV)/.ready ## run the tests
 	$(RUN) -m pytest
