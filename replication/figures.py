@@ -62,6 +62,9 @@ START_COLOUR, GOAL_COLOUR = "#E24A33", "#2CA02C"
 WIDTH = 7.0
 """Inches: both columns of a page."""
 
+ROW = 115
+"""Characters that a row of a legend has room for, 8 of them for each handle."""
+
 
 def _style() -> AbstractContextManager[None]:
     """Draw in our style, whatever the caller's settings are."""
@@ -351,9 +354,9 @@ def _line(one: Curves | Counts) -> dict[str, Any]:
 
 
 def _legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=len(handles) if len(handles) < 5 else 3
-    )
+    wide = sum(len(str(handle.get_label())) + 8 for handle in handles) > ROW
+    ncols = -(-len(handles) // 2) if wide else len(handles)
+    figure.legend(handles=handles, loc="outside lower center", ncols=ncols)
 
 
 def _places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

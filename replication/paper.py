@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-CITATION = (
-    "M. Hwang, W.-C. Jiang, Y.-J. Chen, K.-S. Hwang, Y.-C. Tseng, "
-    "An Efficient Unified Approach Using Demonstrations for Inverse Reinforcement Learning"
-)
-
 
 @dataclass(frozen=True)
 class Published:

@@ -22,12 +22,19 @@ from replication.figures import (
 )
 
 CURVES = [
-    Curves("one", "#0072B2", np.array([[3.0, 1.0, 0.0, 0.0], [2.0, 2.0, 1.0, 0.0]]), published=9),
-    Curves("two", "#D55E00", np.array([[3.0, 1.0, 1.0, 0.0], [2.0, 2.0, 0.0, 0.0]])),
+    Curves(
+        "Unified, without incorrect",
+        "#0072B2",
+        np.array([[3.0, 1.0, 0.0, 0.0], [2.0, 2.0, 1.0, 0.0]]),
+        published=9,
+    ),
+    Curves(
+        "Unified, with incorrect", "#D55E00", np.array([[3.0, 1.0, 1.0, 0.0], [2.0, 2.0, 0.0, 0.0]])
+    ),
 ]
 COUNTS = [
-    Counts("one", "#0072B2", np.array([40, 41, 44]), published=42.0),
-    Counts("two", "#D55E00", np.array([30, 35, 34])),
+    Counts("Unified, without incorrect", "#0072B2", np.array([40, 41, 44]), published=42.0),
+    Counts("Unified, with incorrect", "#D55E00", np.array([30, 35, 34])),
 ]
 SAVED = pd.DataFrame(
     {
@@ -48,6 +55,7 @@ def drawings(small_demos: Demos) -> dict[str, Figure]:
     return {
         "maze": maze_figure(small_demos),
         "errors": error_figure({"left": CURVES, "right": CURVES}),
+        "errors without the paper's": error_figure({"left": CURVES[1:] * 2}),
         "iterations": iterations_figure({"top": COUNTS, "bottom": COUNTS}),
         "surfaces": surfaces_figure(maze, {"Q": np.arange(42.0), "w": np.ones(42)}),
         "sets": sets_figure({"left": SAVED, "right": SAVED}),
@@ -55,7 +63,7 @@ def drawings(small_demos: Demos) -> dict[str, Figure]:
     }
 
 
-KINDS = ["maze", "errors", "iterations", "surfaces", "sets", "fit"]
+KINDS = ["maze", "errors", "errors without the paper's", "iterations", "surfaces", "sets", "fit"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
