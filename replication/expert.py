@@ -5,7 +5,7 @@ maze. The expert always drives whole trajectories from the start:
 
 ``correct``
     Among the shortest paths the one whose straight legs are nearest to a given length (choice
-    DEMO-SHAPE).
+    DEMO-SHAPE), or one drawn at random (choice DEMO-PATH).
 ``hit``
     Misses a turn: at a corner of the correct path it drives straight on until it bumps.
 ``detour``, ``near-detour``, ``far-detour``
@@ -43,7 +43,11 @@ def demonstrate(
 ) -> Demos:
     """Return the demonstrations of all kinds for a maze."""
     params = params or Expert()
-    actions = correct_actions(maze, leg=params.leg)
+    if params.path == "legs":
+        actions = correct_actions(maze, leg=params.leg)
+    else:
+        number = int(params.path.removeprefix("random-"))
+        actions = random_actions(maze, seed=np.random.SeedSequence(number))
     return Demos(
         task=task,
         environment=maze,
@@ -86,6 +90,37 @@ def correct_actions(maze: Maze, *, leg: int) -> list[int]:
     while here in following:
         here = following[here]
         actions.append(here[1])
+    return actions
+
+
+def random_actions(maze: Maze, *, seed: np.random.SeedSequence) -> list[int]:
+    """Return the actions of a shortest path, each of them as likely as any other.
+
+    Raises
+    ------
+    ValueError
+        If there are more than 2**63 shortest paths.
+    """
+    distances, next_state = maze.distances().tolist(), maze.next_state.tolist()
+    rng = np.random.default_rng(seed)
+
+    def options(state: int) -> list[tuple[int, int]]:
+        nearer = distances[state] - 1
+        return [(a, s) for a, s in enumerate(next_state[state]) if distances[s] == nearer]
+
+    ways = {maze.goal: 1}  # number of shortest paths from a state
+    for state in sorted(range(maze.n_states), key=distances.__getitem__):
+        if distances[state] > 0:
+            ways[state] = sum(ways[there] for _, there in options(state))
+    state, actions = maze.start, []
+    while state != maze.goal:
+        drawn = int(rng.integers(ways[state]))
+        for action, there in options(state):
+            if drawn < ways[there]:
+                actions.append(action)
+                state = there
+                break
+            drawn -= ways[there]
     return actions
 
 

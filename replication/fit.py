@@ -160,8 +160,8 @@ def fit(
         seed=seed,
         weights=trial.weights,
         q=trial.q,
-        states=trial.states,
-        actions=trial.actions,
+        states=trial.episodes[-1].states,
+        actions=trial.episodes[-1].actions,
         errors=trial.errors,
         converged=trial.converged,
     )

@@ -120,16 +120,13 @@ def marked_pairs(results: Results, setting: Setting) -> pd.DataFrame:
     that an incorrect demonstration visits; `again` those that were marked and wrong before: under
     F_i as printed only these are moved with the largest trace.
     """
-    trial = results.trial(setting, TRACED_TRIAL, snapshots=True)
-    assert trial.snapshots is not None, "the traced trial keeps its snapshots"
+    trial = results.trial(setting, TRACED_TRIAL)
     shape = setting.task.shape
     incorrect = visited(setting.selected.incorrect, shape=shape)
     expert = visited(setting.selected.correct, shape=shape)
     before = np.zeros(shape, dtype=bool)
     rows = []
-    for i, (states, actions) in enumerate(
-        zip(trial.snapshots.states, trial.snapshots.actions, strict=True)
-    ):
+    for i, (states, actions, _) in enumerate(trial.episodes):
         seen = np.zeros(shape, dtype=bool)
         seen[states[: len(actions)], actions] = True
         wrong = seen & ~expert

@@ -18,6 +18,7 @@ class Expert(Chosen):
     """How the scripted expert drives the stored demonstrations."""
 
     leg: int = choice("DEMO-SHAPE")
+    path: str = choice("DEMO-PATH")
     detour_width: int = choice("DETOUR-WIDTH")
 
 
@@ -78,6 +79,7 @@ class Report(Chosen):
 
     trials: int = choice("TABLE2-TRIALS")
     set_trials: int = choice("SET-TRIALS")
+    early: float = choice("EARLY")
     surface: str = choice("FIG7-SURFACE")
     mid_term: float = choice("FIG7-MIDTERM")
 

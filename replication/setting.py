@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from replication.demos import Demos
+from replication.demos import Demos, content_hash
 from replication.expectations import expert_expectations, visited
 from replication.irl import Method, Trial, get_method, iterate
 from replication.irl.loop import Answer, Request
@@ -49,6 +49,11 @@ class Setting:
         """The demonstrations that the method is given."""
         uses = self.rule.uses_incorrect
         return self.demos.select(self.params.demonstrations.incorrect if uses else "none")
+
+    @cached_property
+    def selected_hash(self) -> str:
+        """The hash of what the method is given, see :func:`replication.demos.content_hash`."""
+        return content_hash(self.selected)
 
     @property
     def rule(self) -> Method:

@@ -21,6 +21,7 @@ from replication.envs.soccer import ACTIONS, N_STATES, SoccerParams
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Words = NDArray[np.uint64]
+Flags = NDArray[np.bool_]
 
 _ACTIONS = (0,) * len(ACTIONS)  # a tuple as long as there are actions, as the kernel wants it
 
@@ -99,17 +100,18 @@ def learn_trial(
 
 def roll_out(
     params: SoccerParams, q: ArrayLike, stream: ArrayLike, random_ties: bool = True
-) -> tuple[Ints, Ints, Words]:
+) -> tuple[Ints, Ints, Flags, Words]:
     """Follow the greedy policy of ``q`` [state, action] for an episode.
 
-    Returns the states, int64 [T + 1], the actions, int64 [T], and the stream after T draws. Raises
-    ValueError as `learn_trial` does.
+    Returns the states, int64 [T + 1]; the actions, int64 [T]; whether the robot touched an obstacle
+    or a wall meanwhile, bool [T]; and the stream after T draws. Raises ValueError as `learn_trial`
+    does.
     """
     values, words = _table("q", q), _words(stream)
     keep: list[Any] = []
     engine = chipmunk.engine(keep)
-    states, actions = _follow(engine, chipmunk.Law.of(params), values, words, random_ties)
-    return states, actions, words
+    states, actions, hits = _follow(engine, chipmunk.Law.of(params), values, words, random_ties)
+    return states, actions, hits, words
 
 
 # These call what is compiled from other files. Numba would not notice if those change, so it must
@@ -140,13 +142,16 @@ def _follow(engine, law, q, stream, random_ties):
     """Run one episode without exploring; the stream advances in place."""
     now, clock = np.zeros(chipmunk.N_FLOATS), np.zeros(chipmunk.N_INTS, np.int64)
     states, actions = [chipmunk.reset(law, now, clock)], [0 for _ in range(0)]
+    hits = [False for _ in range(0)]
     outcome = chipmunk.GOING
     while outcome == chipmunk.GOING:
         action = kernel.choose(_ACTIONS, q[states[-1]], stream, 0, random_ties)
+        touched = clock[1:].sum()
         state, outcome = chipmunk.step(engine, law, now, clock, action)
         actions.append(action)
         states.append(state)
-    return np.array(states), np.array(actions)
+        hits.append(clock[1:].sum() > touched)
+    return np.array(states), np.array(actions), np.array(hits)
 
 
 def _table(name: str, values: ArrayLike) -> Floats:

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import io
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from replication.irl import Snapshots, Trial
+from replication.tasks import Episode
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS trials (key TEXT PRIMARY KEY, record BLOB NOT NULL, snapshots BLOB)
@@ -77,25 +79,27 @@ class Store:
             yield connection
 
 
-_ARRAYS = ("errors", "weights", "q", "states", "actions")
+_ARRAYS = ("errors", "weights", "q", "values")
 
 
 def _pack(trial: Trial) -> bytes:
     arrays = {name: getattr(trial, name) for name in _ARRAYS}
-    return _savez(converged=trial.converged, steps=trial.steps, **arrays)
+    states, actions, hits = map(np.concatenate, zip(*trial.episodes, strict=True))
+    return _savez(
+        converged=trial.converged,
+        steps=trial.steps,
+        lengths=np.array([len(episode.actions) for episode in trial.episodes]),
+        states=states.astype(np.min_scalar_type(states.max())),
+        actions=actions.astype(np.min_scalar_type(actions.max(initial=0))),
+        hits=hits,
+        **arrays,
+    )
 
 
 def _pack_snapshots(snapshots: Snapshots | None) -> bytes | None:
     if snapshots is None:
         return None
-    lengths = [len(actions) for actions in snapshots.actions]
-    return _savez(
-        weights=snapshots.weights,
-        q=snapshots.q,
-        lengths=np.array(lengths),
-        states=np.concatenate(snapshots.states),
-        actions=np.concatenate(snapshots.actions),
-    )
+    return _savez(weights=snapshots.weights, q=snapshots.q)
 
 
 def _unpack(record: bytes, snapshots: bytes | None) -> Trial:
@@ -103,22 +107,24 @@ def _unpack(record: bytes, snapshots: bytes | None) -> Trial:
         return Trial(
             converged=bool(stored["converged"]),
             steps=int(stored["steps"]),
+            episodes=_unpack_episodes(stored),
             snapshots=_unpack_snapshots(snapshots),
             **{name: stored[name] for name in _ARRAYS},
         )
+
+
+def _unpack_episodes(stored: Mapping[str, Any]) -> tuple[Episode, ...]:
+    ends = np.cumsum(stored["lengths"])[:-1]
+    states = np.split(stored["states"].astype(np.int64), ends + np.arange(1, len(ends) + 1))
+    actions = np.split(stored["actions"].astype(np.int64), ends)
+    return tuple(map(Episode, states, actions, np.split(stored["hits"], ends)))
 
 
 def _unpack_snapshots(snapshots: bytes | None) -> Snapshots | None:
     if snapshots is None:
         return None
     with np.load(io.BytesIO(snapshots)) as stored:
-        ends = np.cumsum(stored["lengths"])[:-1]
-        return Snapshots(
-            weights=stored["weights"],
-            q=stored["q"],
-            states=tuple(np.split(stored["states"], ends + np.arange(1, len(ends) + 1))),
-            actions=tuple(np.split(stored["actions"], ends)),
-        )
+        return Snapshots(weights=stored["weights"], q=stored["q"])
 
 
 def _savez(**arrays: object) -> bytes:

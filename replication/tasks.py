@@ -7,7 +7,7 @@ A new kind of task (a physics world, a user's own) is a class with these two met
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,24 @@ from replication.params import Learner, Params
 
 Array = NDArray[np.float64]
 Streams = NDArray[np.uint64]
-Path = NDArray[np.int64]
+
+
+class Episode(NamedTuple):
+    """What an agent did in one episode.
+
+    Attributes
+    ----------
+    states
+        int64 [T + 1], the last being where it ended.
+    actions
+        int64 [T].
+    hits
+        bool [T]: whether the action ran into a wall or an obstacle.
+    """
+
+    states: NDArray[np.int64]
+    actions: NDArray[np.int64]
+    hits: NDArray[np.bool_]
 
 
 class Task(Protocol):
@@ -47,8 +64,8 @@ class Task(Protocol):
         """
         ...
 
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
-        """Return states [T + 1] and actions [T] of a greedy episode, and the stream's position."""
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
+        """Return a greedy episode, and the stream's position after it."""
         ...
 
 
@@ -92,9 +109,9 @@ class MazeTask:
             random_ties=self.learner.ties == "random",
         )
 
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
         """Follow the greedy policy, see :func:`replication.qlearning.roll_out`."""
-        return qlearning.roll_out(
+        states, actions, stream = qlearning.roll_out(
             self.maze.next_state,
             q,
             stream,
@@ -103,6 +120,7 @@ class MazeTask:
             horizon=self.learner.horizon,
             random_ties=self.rollout_ties == "random",
         )
+        return Episode(states, actions, states[1:] == states[:-1]), stream
 
 
 @dataclass(frozen=True)
@@ -140,10 +158,12 @@ class SoccerTask:
         tables, words, steps = zip(*learned, strict=True)
         return np.array(tables), np.array(words), np.array(steps)
 
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Path, Path, Streams]:
+    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
         """Follow the greedy policy, see :func:`replication.soccer_learning.roll_out`."""
-        ties = self.rollout_ties == "random"
-        return soccer_learning.roll_out(self.field.params, q, stream, random_ties=ties)
+        *episode, stream = soccer_learning.roll_out(
+            self.field.params, q, stream, random_ties=self.rollout_ties == "random"
+        )
+        return Episode(*episode), stream
 
 
 def make_task(environment: Environment, params: Params) -> Task:

@@ -20,12 +20,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from replication.demos import content_hash
 from replication.irl import Trial, run
 from replication.seeds import trial_seeds
 from replication.setting import Setting
 from replication.source import source_hash
 from replication.store import Store
+from replication.tasks import Task
 
 TRACED_TRIAL = 0
 """The one trial of a setting that keeps every iteration, declared beforehand (FIG5-TRIAL)."""
@@ -107,37 +107,42 @@ def run_trials(
         Root seed.
     """
     settings = list({trial_key(setting, seed, 0): setting for setting in settings}.values())
-    chunks = []
+    missing: dict[Task, list[tuple[Setting, int]]] = {}
     for setting in settings:
         keys = {k: trial_key(setting, seed, k) for k in range(trials)}
         known = store.known(keys.values())
-        missing = [k for k, key in keys.items() if key not in known]
-        size = setting.task.together
-        for at in range(0, len(missing), size):
-            chunks.append((setting, missing[at : at + size]))
+        wanted = [(setting, k) for k, key in keys.items() if key not in known]
+        missing.setdefault(setting.task, []).extend(wanted)
+    chunks = [
+        (task, wanted[at : at + task.together])
+        for task, wanted in missing.items()
+        for at in range(0, len(wanted), task.together)
+    ]
     work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        joblib.delayed(_compute)(setting, ks, seed) for setting, ks in chunks
+        joblib.delayed(_compute)(task, wanted, seed) for task, wanted in chunks
     )
-    total = sum(len(ks) for _, ks in chunks)
+    total = sum(len(wanted) for _, wanted in chunks)
     if progress is None and "REPLICATION_PROGRESS" in os.environ:
         progress = os.environ["REPLICATION_PROGRESS"] == "1"
     disable = None if progress is None else not progress
     with tqdm(total=total, unit="trial", disable=disable, leave=False) as bar:
         steps = 0
-        for setting, finished in work:
-            store.put((trial_key(setting, seed, k), trial) for k, trial in finished)
-            steps += sum(trial.steps for _, trial in finished)
+        for finished in work:
+            store.put((trial_key(setting, seed, k), trial) for setting, k, trial in finished)
+            steps += sum(trial.steps for _, _, trial in finished)
             bar.update(len(finished))
             elapsed = max(bar.format_dict["elapsed"], 1e-9)
             bar.set_postfix_str(f"{steps / elapsed / 1e6:.0f} M steps/s")
     return Results(store, settings, trials, seed)
 
 
-def _compute(setting: Setting, ks: list[int], root: int) -> tuple[Setting, list[tuple[int, Trial]]]:
-    """Compute trials `ks` of a setting side by side; runs in a worker."""
-    seeds = trial_seeds(root, max(ks) + 1)
-    loops = [setting.trial(seed=seeds[k], keep=k == TRACED_TRIAL) for k in ks]
-    return setting, [(ks[at], trial) for at, trial in run(setting.task, loops)]
+def _compute(
+    task: Task, wanted: list[tuple[Setting, int]], root: int
+) -> list[tuple[Setting, int, Trial]]:
+    """Compute trials of settings that share a task side by side; runs in a worker."""
+    seeds = trial_seeds(root, max(k for _, k in wanted) + 1)
+    loops = [setting.trial(seed=seeds[k], keep=k == TRACED_TRIAL) for setting, k in wanted]
+    return [(*wanted[at], trial) for at, trial in run(task, loops)]
 
 
 def trial_key(setting: Setting, root: int, k: int) -> str:
@@ -145,7 +150,7 @@ def trial_key(setting: Setting, root: int, k: int) -> str:
     params: dict[str, Any] = setting.params.values()
     del params["incorrect"]  # the selected demonstrations stand for it
     content = {
-        "demos": content_hash(setting.selected),
+        "demos": setting.selected_hash,
         "method": setting.method,
         "params": params,
         "seed": [root, k],

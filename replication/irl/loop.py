@@ -19,7 +19,7 @@ from replication.irl.methods import Method
 from replication.params import Params
 from replication.qlearning import stream
 from replication.seeds import child
-from replication.tasks import Task
+from replication.tasks import Episode, Task
 
 Array = NDArray[np.float64]
 
@@ -44,14 +44,11 @@ class Answer(NamedTuple):
 class Snapshots:
     """What one trial went through: entry i is the state after i weight updates.
 
-    `weights` and `q` are `[iteration, state, action]`; `states` and `actions` hold one trajectory
-    for each iteration, of T + 1 and T entries.
+    Both are `[iteration, state, action]`.
     """
 
     weights: Array
     q: Array
-    states: tuple[NDArray[np.int64], ...]
-    actions: tuple[NDArray[np.int64], ...]
 
 
 @dataclass(frozen=True)
@@ -68,8 +65,11 @@ class Trial:
         Learning steps in the environment, over all iterations.
     weights, q
         The last reward weights and Q-table, `[state, action]`.
-    states, actions
-        The last trajectory, [T + 1] and [T].
+    episodes
+        The agent's trajectory before each update and after the last one, as many as errors.
+    values
+        max_a Q(s, a) `[iteration, state]` in the states where the expert acts, in ascending order
+        of the states: entry i after i updates. Single precision, as it is for reports only.
     snapshots
         Every iteration, where they were asked for.
     """
@@ -79,8 +79,8 @@ class Trial:
     steps: int
     weights: Array
     q: Array
-    states: NDArray[np.int64]
-    actions: NDArray[np.int64]
+    episodes: tuple[Episode, ...]
+    values: NDArray[np.float32]
     snapshots: Snapshots | None = None
 
     @property
@@ -128,16 +128,21 @@ def iterate(
     w = _start_weights(task.shape, params, seed=child(seed, 2))
     q = np.zeros(task.shape)
     errors: list[float] = []
-    kept: list[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
+    episodes: list[Episode] = []
+    values: list[NDArray[np.float32]] = []
+    kept: list[tuple[Array, Array]] = []
+    on_path = np.flatnonzero(mu_e.any(axis=1))
     steps = 0
     for i in range(params.loop.max_iterations + 1):
-        states, actions, rolling = task.roll_out(q, rolling)
+        episode, rolling = task.roll_out(q, rolling)
         mu_i = feature_expectations(
-            states, actions, gamma=params.learner.gamma, shape=task.shape
+            episode.states, episode.actions, gamma=params.learner.gamma, shape=task.shape
         )  # Eq. 7
         errors.append(float(np.linalg.norm(mu_e - mu_i)))  # Eq. 6
+        episodes.append(episode)
+        values.append(q[on_path].max(axis=1).astype(np.float32))
         if keep:
-            kept.append((w, q, states, actions))
+            kept.append((w, q))
         converged = errors[-1] <= params.loop.threshold
         if converged or i == params.loop.max_iterations:
             break
@@ -149,9 +154,10 @@ def iterate(
         steps += n
     snapshots = None
     if keep:
-        weights, tables, all_states, all_actions = zip(*kept, strict=True)
-        snapshots = Snapshots(np.array(weights), np.array(tables), all_states, all_actions)
-    return Trial(np.array(errors), converged, steps, w, q, states, actions, snapshots)
+        snapshots = Snapshots(*map(np.array, zip(*kept, strict=True)))
+    return Trial(
+        np.array(errors), converged, steps, w, q, tuple(episodes), np.array(values), snapshots
+    )
 
 
 def run(
