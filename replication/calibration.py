@@ -56,7 +56,10 @@ def chosen() -> Point:
 
 def grid_settings(maze: Maze) -> dict[Point, Setting]:
     """Return the setting of each point: the unified method without incorrect demonstrations."""
-    legs = {leg: demonstrate("open-maze", maze, params=Expert(leg=leg)) for leg, *_ in grid()}
+    legs = {
+        leg: demonstrate("open-maze", maze, params=Expert(leg=int(leg)))
+        for leg in dict.fromkeys(leg for leg, *_ in grid())
+    }
     return {
         (leg, alpha, f_start, ties): Setting(
             legs[leg], "unified", Params.of(alpha=alpha, f_start=f_start, ties=ties)

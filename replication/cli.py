@@ -253,7 +253,7 @@ def make(
     from replication.expert import demonstrate
     from replication.params import Expert
 
-    given = {"leg": leg, "detour_width": detour_width}
+    given: dict[str, Any] = {"leg": leg, "detour_width": detour_width}
     params = Expert(**{name: value for name, value in given.items() if value is not None})
     try:
         # a byte that is no UTF-8 becomes a character that the map refuses, with its place

@@ -1,18 +1,18 @@
-"""What the notebooks compare: the settings of each table, and the claims judged from them."""
+"""What the notebooks compare: the settings behind each figure and table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from replication.choices import Choice, ChoiceError, register
-from replication.demos import DemoError, Demos
-from replication.envs.field import SoccerField
+from replication.choices import ChoiceError, register
+from replication.demos import Demos, load_demos
 from replication.irl import METHODS
-from replication.params import Params, SoccerExpert
+from replication.paper import SOCCER
+from replication.params import Params
+from replication.paths import resolve
 from replication.setting import Setting
-from replication.soccer_expert import demonstrate_soccer
 
 F_INDICES = ("printed", "updated")
 """Both readings of Eq. 9 (choice F-INDEX), reported side by side everywhere."""
@@ -39,48 +39,28 @@ Key = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Claim:
-    """A claim that compares the methods `x` and `y` in the statistic `judged`.
+class Experiment:
+    """One of the paper's experiments: its demonstrations, its own parameters and its methods."""
 
-    `judged` is "fewer" (the mean of the iterations) or "steadier" (their spread); the criteria are
-    those of :mod:`replication.statistics`. `place` is empty for an extension of ours.
-    """
+    demos: str
+    choices: Mapping[str, Any]
+    methods: tuple[str, ...]
 
-    text: str
-    place: str
-    x: str
-    y: str
-    judged: str
+    def settings(self) -> dict[Key, Setting]:
+        """Return the settings that stand behind its figures and tables."""
+        return method_settings(load_demos(resolve(self.demos)), self.choices, self.methods)
 
 
-FASTER = Claim(
-    "the unified method needs fewer iterations than AdaBoost-IRL (R1)",
-    "Table I, Fig. 6",
-    "unified",
-    "adaboost",
-    "fewer",
-)
-STEADIER = Claim(
-    "its iterations spread less than those of AdaBoost-IRL (R1)",
-    "Table I, Fig. 6",
-    "unified",
-    "adaboost",
-    "steadier",
-)
-INCORRECT_HELP = Claim(
-    "incorrect demonstrations save iterations",
-    "Table I",
-    "unified-incorrect",
-    "unified",
-    "fewer",
-)
-SOCCER_CLAIMS = (Claim(INCORRECT_HELP.text, "Fig. 12", "unified-incorrect", "unified", "fewer"),)
-TABLE_1_CLAIMS = (FASTER, STEADIER, INCORRECT_HELP)
-TABLE_2_CLAIMS = (
-    Claim(INCORRECT_HELP.text, "Table II, Fig. 9", "unified-incorrect", "unified", "fewer"),
-    Claim(FASTER.text, "", "unified", "adaboost", "fewer"),
-    Claim(STEADIER.text, "", "unified", "adaboost", "steadier"),
-)
+EXPERIMENTS = {
+    "open-maze": Experiment("data/demos/open_maze.json", {}, tuple(METHODS)),
+    "obstacle-maze": Experiment("data/demos/obstacle_maze.json", {}, tuple(METHODS)),
+    "soccer": Experiment(
+        "data/demos/soccer.json",
+        {**SOCCER, "incorrect": "all"},
+        ("unified", "unified-incorrect"),
+    ),
+}
+"""By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension."""
 
 
 def method_settings(
@@ -111,45 +91,6 @@ def rule_settings(demos: Demos, choices: Mapping[str, Any]) -> dict[str, Setting
         str(rule): Setting(demos, "adaboost", Params.of(**{**choices, "adaboost_rule": rule}))
         for rule in (entry.default, *entry.alternatives)
     }
-
-
-def soccer_readings(demos: Demos, choices: Mapping[str, Any]) -> dict[str, tuple[Setting, Setting]]:
-    """Return settings without and with incorrect demonstrations, one registered choice changed.
-
-    The world, and with it the demonstrations, is made anew where the choice is one of the world.
-    """
-    field = demos.environment
-    if not isinstance(field, SoccerField):
-        raise DemoError(f"task {demos.task} is not robot soccer")
-    entries = register()
-    learning = [
-        ("F-INDEX", "updated"),
-        ("GOAL-VALUE", "bootstrap"),
-        ("TIES", "first"),
-        ("Q-START", "reset"),
-        ("EPISODES", 10),
-    ]
-    learning += [("INCORRECT-KINDS", kind) for kind in demos.kinds]
-    worlds = [("SOCCER-MACRO", "cell"), ("SOCCER-ARC", 180), ("SOCCER-DECISION", 0.4)]
-    tried = {"default": (demos, dict(choices))}
-    for id, value in learning:
-        tried[f"{id}={value}"] = demos, {**choices, _name(entries[id]): value}
-    for id, value in worlds:
-        changed: dict[str, Any] = {_name(entries[id]): value}
-        other = SoccerField(replace(field.params, **changed))
-        tried[f"{id}={value}"] = demonstrate_soccer(demos.task, other), dict(choices)
-    every = demonstrate_soccer(demos.task, field, params=SoccerExpert(leave="every"))
-    tried["SOCCER-INCORRECT=every"] = every, dict(choices)
-    return {
-        name: (Setting(one, "unified", params), Setting(one, "unified-incorrect", params))
-        for name, (one, values) in tried.items()
-        for params in [Params.of(**values)]
-    }
-
-
-def _name(entry: Choice) -> str:
-    """Return the name of the parameter that holds a choice."""
-    return entry.field.split(".")[1]
 
 
 def set_settings(

@@ -22,8 +22,9 @@ INCORRECT-NUMBER).
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
+from functools import lru_cache
+from heapq import heappop, heappush
 from itertools import pairwise
 
 import numpy as np
@@ -186,12 +187,11 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
                 point = _beside(point, action)
         if not all(0 <= x < size for x, size in zip(point, maze.shape, strict=True)):
             continue
-        ways = [int(path[leave]), maze.state(*point), int(path[join])]
-        legs = [
-            _fewest_turns(maze, a, b, avoid=set(path.tolist()) - {a, b}) for a, b in pairwise(ways)
-        ]
-        way = [action for part in legs for action in part or []]
-        if all(legs) and all(b != OPPOSITE[a] for a, b in pairwise(way)):
+        a, b, c = int(path[leave]), maze.state(*point), int(path[join])
+        out = _ways(maze, a, frozenset(path.tolist()) - {a, b}).get(b)
+        home = out and _ways(maze, b, frozenset(path.tolist()) - {b, c}).get(c)
+        way = [*(out or []), *(home or [])]
+        if out and home and all(b != OPPOSITE[a] for a, b in pairwise(way)):
             return correct[:leave] + way + correct[join:]
     return None
 
@@ -201,21 +201,24 @@ def _beside(point: tuple[int, int], action: int) -> tuple[int, int]:
     return point[0] + down, point[1] + right
 
 
-def _fewest_turns(maze: Maze, source: int, target: int, *, avoid: set[int]) -> list[int] | None:
-    """Return the shortest way with the fewest turns that keeps off `avoid`, or None."""
-    best: dict[tuple[int, int], tuple[int, int, list[int]]] = {}
-    queue: deque[tuple[int, int, int, list[int]]] = deque([(source, -1, 0, [])])
-    while queue:
-        state, last, turns, actions = queue.popleft()
-        known = best.get((state, last))
-        if known is not None and known[:2] <= (len(actions), turns):
+@lru_cache(maxsize=64)
+def _ways(maze: Maze, source: int, avoid: frozenset[int]) -> dict[int, list[int]]:
+    """Return for each state the shortest way to it that keeps off `avoid`.
+
+    Among the shortest it is one with the fewest turns; ties in the order of the actions.
+    """
+    done: set[tuple[int, int]] = set()
+    reached: dict[int, list[int]] = {}
+    heap: list[tuple[int, int, list[int], int]] = [(0, 0, [], source)]
+    while heap:
+        moves, turns, actions, state = heappop(heap)
+        last = actions[-1] if actions else -1
+        if (state, last) in done:
             continue
-        best[state, last] = (len(actions), turns, actions)
-        if state == target:
-            continue
+        done.add((state, last))
+        reached.setdefault(state, actions)
         for action, there in enumerate(maze.next_state[state].tolist()):
-            if there != state and there not in avoid:
+            if there != state and there not in avoid and (there, action) not in done:
                 turned = last not in (-1, action)
-                queue.append((there, action, turns + turned, [*actions, action]))
-    reached = [found for (state, _), found in best.items() if state == target]
-    return min(reached)[2] if reached else None
+                heappush(heap, (moves + 1, turns + turned, [*actions, action], there))
+    return reached

@@ -151,7 +151,7 @@ def set_panels(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     `table` is that of :func:`replication.tables.sets_table`, whose differences are negative where
     iterations are saved.
     """
-    shown = table[table["verdict"] != ""]
+    shown = table[table["set"] != "none"]
     saved = pd.DataFrame(
         {
             "F": shown["F"],
@@ -162,8 +162,7 @@ def set_panels(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
             "high": 0 - shown["low"],
         }
     )
-    titles = F_LABELS | {"": "one choice changed at a time"}
-    return {titles[f]: part for f, part in saved.groupby("F", sort=False)}
+    return {F_LABELS[f]: part for f, part in saved.groupby("F", sort=False)}
 
 
 def set_numbers(panels: Mapping[str, pd.DataFrame]) -> pd.DataFrame:

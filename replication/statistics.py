@@ -1,4 +1,4 @@
-"""Statistics of iteration counts: summaries, paired comparisons, and the criterion for a verdict.
+"""Statistics of what trials give: summaries, paired comparisons, intervals and predictions.
 
 All methods share their seeds, so comparisons are paired by trial. Intervals are 95 %. A trial that
 ended at the iteration cap has no count: where there is one, means are not computed and a comparison
@@ -17,18 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 CONFIDENCE = 0.95
-ALPHA = 0.05
 RESAMPLES = 9999
 BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
 
 FEWEST = 30
-"""Trials below which no verdict is given."""
-
-REPRODUCED = "reproduced"
-REVERSED = "reversed"
-UNDECIDED = "undecided"
-NOT_REPRODUCED = "not reproduced"
-NOT_TESTABLE = "not testable"
+"""Trials below which a ratio of SDs gets no interval."""
 
 
 @dataclass(frozen=True)
@@ -194,47 +187,48 @@ def power(sd: float, n: int, effect: float) -> float:
     return float(stats.nct.sf(critical, n - 1, shift) + np.nan_to_num(wrong_side))
 
 
-def verdict_fewer(comparison: Comparison, p: float) -> str:
-    """Judge "x needs fewer iterations than y".
-
-    The criterion has two locks: the interval of the mean difference excludes zero, and the
-    signed-rank test rejects at 5 % after Holm's adjustment. Reproduced, or reversed, if both say
-    so; not reproduced if neither does; undecided if they disagree.
-
-    Parameters
-    ----------
-    comparison
-        Of x with y.
-    p
-        The adjusted p-value.
-    """
-    return _verdict(comparison, comparison.low, comparison.high, 0.0, p)
-
-
-def verdict_steadier(comparison: Comparison, p: float) -> str:
-    """Judge "the iterations of x spread less than those of y".
-
-    As :func:`verdict_fewer`, with the interval of the ratio of SDs, which has to exclude one, and
-    the Brown-Forsythe test.
-    """
-    return _verdict(comparison, comparison.sd_low, comparison.sd_high, 1.0, p)
-
-
-def _verdict(comparison: Comparison, low: float, high: float, null: float, p: float) -> str:
-    if comparison.n < FEWEST or np.isnan([low, high, p]).any():
-        return NOT_TESTABLE
-    excluded, rejected = not low <= null <= high, p < ALPHA
-    if excluded != rejected:
-        return UNDECIDED
-    if not excluded:
-        return NOT_REPRODUCED
-    return REPRODUCED if high < null else REVERSED
-
-
-def prediction_interval(mean: float, sd: float, n: int, m: int) -> tuple[float, float]:
+def mean_prediction(mean: float, sd: float, n: int, m: int) -> tuple[float, float]:
     """Return where the mean of `m` new trials should lie, given `n` with this mean and SD."""
     half = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1) * sd * np.sqrt(1 / n + 1 / m)
     return float(mean - half), float(mean + half)
+
+
+def sd_prediction(sd: float, n: int, own: NDArray[np.float64]) -> tuple[float, float]:
+    """Return where the SD of a sample as large as `own` should lie, given `n` with this SD.
+
+    The logarithm of an SD is taken as normal, with the variance (kurtosis - 1) / (4 n) that it has
+    for large samples, and both samples with the kurtosis of `own`.
+    """
+    half = _normal() * np.sqrt(_log_sd_variance(own) * (1 + len(own) / n))
+    return float(sd * np.exp(-half)), float(sd * np.exp(half))
+
+
+def sd_interval(sample: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the interval of an SD, by the same approximation as :func:`sd_prediction`."""
+    sd, half = sample.std(ddof=1), _normal() * np.sqrt(_log_sd_variance(sample))
+    return float(sd * np.exp(-half)), float(sd * np.exp(half))
+
+
+def _log_sd_variance(sample: NDArray[np.float64]) -> float:
+    if np.ptp(sample) == 0:
+        return float("nan")
+    return float((stats.kurtosis(sample, fisher=False) - 1) / (4 * len(sample)))
+
+
+def _normal() -> float:
+    return float(stats.norm.ppf((1 + CONFIDENCE) / 2))
+
+
+def share_interval(k: int, n: int) -> tuple[float, float]:
+    """Return the Clopper-Pearson interval of a share, `k` of `n`.
+
+    Examples
+    --------
+    >>> [round(x, 3) for x in share_interval(100, 100)]
+    [0.964, 1.0]
+    """
+    found = stats.binomtest(k, n).proportion_ci(CONFIDENCE)
+    return float(found.low), float(found.high)
 
 
 def holm(p_values: Sequence[float]) -> NDArray[np.float64]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from replication.comparisons import F_INDICES, F_LABELS, Claim, Key
+from replication.comparisons import F_INDICES, F_LABELS, Key
 from replication.demos import Demos
 from replication.envs.maze import Maze
 from replication.expectations import visited
@@ -23,12 +22,9 @@ from replication.statistics import (
     Comparison,
     compare,
     holm,
-    prediction_interval,
+    mean_prediction,
     summarise,
-    verdict_fewer,
-    verdict_steadier,
 )
-from replication.trials import Results
 
 
 def rows_of(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
@@ -75,56 +71,13 @@ def summary_table(
             paper = published[method]
             row |= {"paper_mean": paper.mean, "paper_sd": paper.sd}
             if paper.n > 1:
-                low, high = prediction_interval(paper.mean, paper.sd, paper.n, ours.n)
+                low, high = mean_prediction(paper.mean, paper.sd, paper.n, ours.n)
                 test = stats.ttest_ind_from_stats(
                     ours.mean, ours.sd, ours.n, paper.mean, paper.sd, paper.n, equal_var=False
                 )
                 row |= {"predicted_low": low, "predicted_high": high, "p_paper": test.pvalue}
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def claims_table(
-    trials: pd.DataFrame,
-    settings: Mapping[Key, Setting],
-    claims: Iterable[Claim],
-    published: Mapping[str, Published],
-) -> pd.DataFrame:
-    """Return one row for each claim and reading of Eq. 9, with its verdict.
-
-    `p` is that of the paired signed-rank test for "fewer" and of the Brown-Forsythe test for
-    "steadier", `p_holm` the same adjusted over all rows of the table. `paper_effect` is the
-    published difference of means, or ratio of SDs.
-    """
-    rows, judges = [], []
-    for claim in claims:
-        for f in dict.fromkeys(f for method, f in settings if method == claim.x):
-            x = settings[claim.x, f]
-            y = settings[claim.y, f] if (claim.y, f) in settings else settings[claim.y, ""]
-            difference, ratio = np.nan, np.nan
-            if claim.x in published and claim.y in published:
-                difference = published[claim.x].mean - published[claim.y].mean
-                ratio = published[claim.x].sd / published[claim.y].sd
-            found = comparison(trials, x, y, published=difference)
-            fewer = claim.judged == "fewer"
-            judges.append((verdict_fewer if fewer else verdict_steadier, found))
-            rows.append(
-                {
-                    "claim": claim.text,
-                    "place": claim.place or "ours",
-                    "F": f,
-                    "judged": claim.judged,
-                    **asdict(found),
-                    "paper_effect": difference if fewer else ratio,
-                    "p": found.p_wilcoxon if fewer else found.p_spread,
-                }
-            )
-    table = pd.DataFrame(rows)
-    table["p_holm"] = holm(table["p"].tolist())
-    table["verdict"] = [
-        judge(found, p) for (judge, found), p in zip(judges, table["p_holm"], strict=True)
-    ]
-    return table
 
 
 def rules_table(
@@ -173,7 +126,7 @@ def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.Data
     Beside the difference from no incorrect demonstrations stand the numbers of pairs by their
     distance from the correct path, see :func:`pairs_near`. P-values are adjusted over all rows.
     """
-    rows, comparisons = [], []
+    rows = []
     for (kinds, f), setting in settings.items():
         found = comparison(trials, setting, settings["none", f])
         own = rows_of(trials, setting)
@@ -192,81 +145,11 @@ def sets_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.Data
                 "p": np.nan if kinds == "none" else found.p_wilcoxon,
             }
         )
-        comparisons.append(found)
     table = pd.DataFrame(rows)
     table["p_holm"] = np.nan
     judged = table["set"] != "none"
     table.loc[judged, "p_holm"] = holm(table.loc[judged, "p"].tolist())
-    table["verdict"] = [
-        verdict_fewer(found, p) if is_judged else ""
-        for found, p, is_judged in zip(comparisons, table["p_holm"], judged, strict=True)
-    ]
     return table
-
-
-def readings_table(
-    results: Results, readings: Mapping[str, tuple[Setting, Setting]]
-) -> pd.DataFrame:
-    """Return one row for each reading of the task: what incorrect demonstrations save in it.
-
-    Parameters
-    ----------
-    results
-        The trials of all settings.
-    readings
-        By name, a setting without and one with incorrect demonstrations.
-    """
-    rows, comparisons = [], []
-    for name, (without, with_them) in readings.items():
-        a, b = results.iterations(without), results.iterations(with_them)
-        done = [results.converged(setting) for setting in (without, with_them)]
-        found = compare(b, a, capped=not all(one.all() for one in done))
-        plain, marked = (summarise(x, one) for x, one in zip((a, b), done, strict=True))
-        near = pairs_near(with_them.selected)
-        rows.append(
-            {
-                "set": name,
-                "F": "",
-                "demonstrations": len(with_them.selected.incorrect),
-                "pairs": near["pairs"],
-                "leaving": near["leaving"],
-                "moves": len(with_them.demos.correct[0].actions),
-                "without_mean": plain.mean,
-                "without_sd": plain.sd,
-                "with_mean": marked.mean,
-                "with_sd": marked.sd,
-                "capped": plain.capped + marked.capped,
-                "difference": found.difference,
-                "low": found.low,
-                "high": found.high,
-                "p": found.p_wilcoxon,
-            }
-        )
-        comparisons.append(found)
-    table = pd.DataFrame(rows)
-    table["p_holm"] = holm(table["p"].tolist())
-    table["verdict"] = [
-        verdict_fewer(found, p) for found, p in zip(comparisons, table["p_holm"], strict=True)
-    ]
-    return table
-
-
-def readable_readings(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of readings as a reader wants it."""
-    readable = table[["set", "moves", "demonstrations", "pairs", "leaving"]].rename(
-        columns=lambda name: "Reading" if name == "set" else name.capitalize()
-    )
-    for column in ("without", "with"):
-        readable[f"{column.capitalize()}: mean (SD)"] = [
-            f"{_number(mean)} ({_number(sd)})"
-            for mean, sd in zip(table[f"{column}_mean"], table[f"{column}_sd"], strict=True)
-        ]
-    readable["Saves [95 %]"] = [
-        _interval(0 - row.difference, 0 - row.high, 0 - row.low) for row in table.itertuples()
-    ]
-    readable["p, Holm"] = table["p_holm"].map(_p)
-    readable["Verdict"] = table["verdict"]
-    return readable
 
 
 def pairs_near(demos: Demos) -> dict[str, int]:
@@ -318,23 +201,6 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
     return readable
 
 
-def readable_claims(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of claims as a reader wants it: the effect that each claim is about."""
-    readable = table[["claim", "place"]].rename(columns={"claim": "Claim", "place": "Place"})
-    readable["F"] = table["F"].map(F_LABELS)
-    readable["Effect [95 %]"] = [_effect(row) for row in table.itertuples()]
-    readable["Paper"] = table["paper_effect"].map(_number)
-    readable["P(fewer)"] = table["fewer"].map(_number)
-    readable["p"] = table["p"].map(_p)
-    readable["p, Holm"] = table["p_holm"].map(_p)
-    readable["Power"] = [
-        "–" if judged == "steadier" else _number(power)
-        for power, judged in zip(table["power"], table["judged"], strict=True)
-    ]
-    readable["Verdict"] = table["verdict"]
-    return readable
-
-
 def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table of sets as a reader wants it, both readings of Eq. 9 in one row."""
     keys = ["set", "demonstrations", "pairs", "leaving", "beside"]
@@ -346,33 +212,12 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
             for mean, sd in zip(part["mean"], part["sd"], strict=True)
         ]
         readable[f"{label}: saves"] = [
-            "–" if not verdict else _interval(0 - difference, 0 - high, 0 - low)
-            for verdict, difference, low, high in zip(
-                part["verdict"], part["difference"], part["low"], part["high"], strict=True
+            "–" if kinds == "none" else _interval(0 - difference, 0 - high, 0 - low)
+            for kinds, difference, low, high in zip(
+                part["set"], part["difference"], part["low"], part["high"], strict=True
             )
         ]
     return readable.rename(columns={key: key.capitalize() for key in keys})
-
-
-def findings(table: pd.DataFrame) -> str:
-    """Return a table of claims in words, as a Markdown list."""
-    lines = []
-    for row in table.itertuples():
-        paper = "" if np.isnan(row.paper_effect) else f", in the paper {row.paper_effect:.2f}"
-        numbers = f"{_effect(row)}{paper}; p {_p(row.p)}, after Holm {_p(row.p_holm)}"
-        lines.append(f"- **{row.verdict}** with {F_LABELS[row.F]}: {row.claim} ({numbers}).\n")
-    return "".join(lines)
-
-
-def findings_of_sets(table: pd.DataFrame) -> str:
-    """Return in words which sets of incorrect demonstrations change the number of iterations."""
-    lines = []
-    for f, part in table[table["verdict"] != ""].groupby("F", sort=False):
-        by_verdict = part.groupby("verdict", sort=False)["set"].agg(", ".join)
-        said = "; ".join(f"**{verdict}** for {sets}" for verdict, sets in by_verdict.items())
-        begin = f"With {F_LABELS[f]}, that" if f else "That"
-        lines.append(f"- {begin} incorrect demonstrations save iterations is {said}.\n")
-    return "".join(lines)
 
 
 def markdown(table: pd.DataFrame) -> str:
@@ -409,13 +254,6 @@ def _quartiles(table: pd.DataFrame) -> list[str]:
         f"{m:g} ({a:g}–{b:g})"
         for m, a, b in zip(table["median"], table["quartile_1"], table["quartile_3"], strict=True)
     ]
-
-
-def _effect(row: Any) -> str:
-    """Return the mean difference, or the ratio of SDs, with its interval."""
-    if row.judged == "fewer":
-        return _interval(row.difference, row.low, row.high)
-    return f"SD × {_interval(row.sd_ratio, row.sd_low, row.sd_high)}"
 
 
 def _number(x: float) -> str:

@@ -160,10 +160,10 @@ class SoccerTask:
 
     def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
         """Follow the greedy policy, see :func:`replication.soccer_learning.roll_out`."""
-        *episode, stream = soccer_learning.roll_out(
+        states, actions, hits, stream = soccer_learning.roll_out(
             self.field.params, q, stream, random_ties=self.rollout_ties == "random"
         )
-        return Episode(*episode), stream
+        return Episode(states, actions, hits), stream
 
 
 def make_task(environment: Environment, params: Params) -> Task:
