@@ -1,0 +1,359 @@
+"""The declared specifications: sets of choices under which the claims are evaluated again.
+
+The file ``specifications.toml`` declares them; this module reads it and makes settings of them.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from replication.choices import ChoiceError, Value, register
+from replication.claims import ClaimError, claims
+from replication.comparisons import EXPERIMENTS, Key, method_settings
+from replication.demos import Demo, Demos, load_demos
+from replication.envs.field import SoccerField
+from replication.envs.maze import Maze
+from replication.expectations import visited
+from replication.expert import demonstrate
+from replication.params import Expert, Params, SoccerExpert
+from replication.paths import resolve
+from replication.setting import Setting
+from replication.soccer_expert import demonstrate_soccer
+
+MAPS = ("open", "obstacles", "random-1", "random-2", "random-3")
+RANDOM = "random"
+"""As a value of DEMO-SHAPE: a shortest path drawn at random (DEMO-PATH = random-1)."""
+
+OBSTACLES = 30
+MOVES = 33
+"""Obstacle cells of a random maze, and the length of its shortest path."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Single(_Strict):
+    """Specifications that change one choice each."""
+
+    trials: int
+    choices: Mapping[str, tuple[Value, ...]]
+
+
+class Factorial(Single):
+    """Specifications that set all choices at once: a balanced fraction of the full factorial."""
+
+    size: int
+    seed: int
+
+
+class Mazes(_Strict):
+    """What is declared for the mazes."""
+
+    claims: tuple[str, ...]
+    single: Single
+    factorial: Factorial
+
+
+class Soccer(_Strict):
+    """What is declared for robot soccer."""
+
+    claims: tuple[str, ...]
+    single: Single
+
+
+class Ablations(_Strict):
+    """The method with parts of it switched off, and the number of incorrect demonstrations."""
+
+    trials: int
+    traces: tuple[Mapping[str, float], ...]
+    seed: int
+    numbers: tuple[int | Literal["all"], ...]
+
+
+class Declared(_Strict):
+    """The whole file."""
+
+    root_seed: int
+    iteration_cap: int
+    mazes: Mazes
+    soccer: Soccer
+    ablations: Ablations
+
+
+@dataclass(frozen=True)
+class Specification:
+    """Choices by their ids; those that are not named have their defaults."""
+
+    group: str
+    choices: tuple[tuple[str, Value], ...]
+
+    @property
+    def name(self) -> str:
+        """The choices in words: `ID=value`, parted by blanks."""
+        return " ".join(f"{id}={value}" for id, value in self.choices) or "default"
+
+
+# --- reading ---------------------------------------------------------------------------------
+
+
+@cache
+def declared() -> Declared:
+    """Return the specifications of the package."""
+    text = resources.files("replication").joinpath("specifications.toml").read_text("utf-8")
+    return parse_specifications(text)
+
+
+def parse_specifications(text: str) -> Declared:
+    """Read and check a file of specifications.
+
+    Raises
+    ------
+    ChoiceError, ClaimError
+        In one line that names the place, for what is unknown, missing or not accepted.
+    """
+    try:
+        found = Declared(**tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ChoiceError(f"specifications.toml is not TOML: {error}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ChoiceError(f"specifications.toml, {place}: {first['msg']}") from None
+    known = {one.id for one in claims().claim}
+    for id in (*found.mazes.claims, *found.soccer.claims):
+        if id not in known:
+            raise ClaimError(f"specifications.toml: there is no claim {id!r}")
+    tables = {
+        "mazes.single": found.mazes.single.choices,
+        "mazes.factorial": found.mazes.factorial.choices,
+        "soccer.single": found.soccer.single.choices,
+        **{
+            f"ablations.traces[{n}]": {id: (value,) for id, value in one.items()}
+            for n, one in enumerate(found.ablations.traces)
+        },
+    }
+    for place, table in tables.items():
+        for id, values in table.items():
+            for value in values:
+                try:
+                    _check(id, value)
+                except ChoiceError as error:
+                    raise ChoiceError(f"specifications.toml, {place}: {error}") from None
+    for id, values in found.mazes.factorial.choices.items():
+        if found.mazes.factorial.size % len(values):
+            raise ChoiceError(
+                f"specifications.toml, mazes.factorial: {len(values)} values of {id} cannot be "
+                f"balanced over {found.mazes.factorial.size} specifications"
+            )
+    return found
+
+
+def _check(id: str, value: Value) -> None:
+    """Refuse a choice or a value that the register does not have."""
+    if id == "MAP":
+        if value not in MAPS:
+            raise ChoiceError(f"MAP = {value!r} is not accepted: use {', '.join(MAPS)}")
+    elif id not in register():
+        raise ChoiceError(f"there is no choice {id!r}")
+    elif not (id, value) == ("DEMO-SHAPE", RANDOM) and id != "SOCCER-EPISODES":
+        if not register()[id].field:
+            raise ChoiceError(f"{id} has no parameter that could be changed")
+        register()[id].check(value)
+
+
+# --- the specifications ----------------------------------------------------------------------
+
+
+def default_of(id: str) -> Value:
+    """Return the default of a choice that a specification can change."""
+    return "open" if id == "MAP" else register()[id].default
+
+
+def single_specifications(choices: Mapping[str, tuple[Value, ...]]) -> list[Specification]:
+    """Return the default, and then one specification for each other value of each choice."""
+    changed = [((id, value),) for id, values in choices.items() for value in values]
+    return [Specification("single", one) for one in ((), *changed)]
+
+
+def factorial_specifications(factorial: Factorial) -> list[Specification]:
+    """Return a balanced fraction of the full factorial.
+
+    Each value of a choice stands in equally many specifications; the order of each choice is a
+    random permutation of its own, so that choices are nearly uncorrelated.
+    """
+    seeds = np.random.SeedSequence(factorial.seed).spawn(len(factorial.choices))
+    columns = {}
+    for seed, (id, values) in zip(seeds, factorial.choices.items(), strict=True):
+        order = np.random.default_rng(seed).permutation(factorial.size)
+        columns[id] = [values[at % len(values)] for at in order.tolist()]
+    return [
+        Specification("factorial", tuple(zip(columns, row, strict=True)))
+        for row in zip(*columns.values(), strict=True)
+    ]
+
+
+def maze_settings(specification: Specification, cap: int) -> dict[Key, Setting]:
+    """Return the settings of all methods in a maze, under the reading of Eq. 9 it chooses."""
+    choices = dict(specification.choices)
+    world = str(choices.pop("MAP", "open"))
+    expert: dict[str, Any] = {}
+    if choices.get("DEMO-SHAPE") == RANDOM:
+        del choices["DEMO-SHAPE"]
+        expert["path"] = "random-1"
+    for id in ("DEMO-SHAPE", "DEMO-PATH", "DETOUR-WIDTH"):
+        if id in choices:
+            expert[_name(id)] = choices.pop(id)
+    demos = _maze_demos(world, Expert(**expert))
+    return _chosen_reading(
+        demos, {"max_iterations": cap}, choices, EXPERIMENTS["open-maze"].methods
+    )
+
+
+def soccer_settings(specification: Specification, cap: int) -> dict[Key, Setting]:
+    """Return the settings of both methods in robot soccer; the world is made anew if it changes."""
+    choices = dict(specification.choices)
+    experiment = EXPERIMENTS["soccer"]
+    demos = load_demos(resolve(experiment.demos))
+    assert isinstance(demos.environment, SoccerField)
+    if "SOCCER-EPISODES" in choices:
+        choices["EPISODES"] = choices.pop("SOCCER-EPISODES")
+    world: dict[str, Any] = {}
+    for id in list(choices):
+        if register()[id].field.startswith("SoccerParams."):
+            world[_name(id)] = choices.pop(id)
+    leave = choices.pop("SOCCER-INCORRECT", None)
+    if world or leave:
+        field = SoccerField(replace(demos.environment.params, **world))
+        params = SoccerExpert(leave=str(leave)) if leave else SoccerExpert()
+        demos = demonstrate_soccer(demos.task, field, params=params)
+    base = {**experiment.choices, "max_iterations": cap}
+    return _chosen_reading(demos, base, choices, experiment.methods)
+
+
+def _chosen_reading(
+    demos: Demos, base: Mapping[str, Any], choices: Mapping[str, Value], methods: tuple[str, ...]
+) -> dict[Key, Setting]:
+    values = {**base, **{_name(id): value for id, value in choices.items()}}
+    reading = values.pop("f_index", default_of("F-INDEX"))
+    settings = method_settings(demos, values, methods)
+    return {(name, f): one for (name, f), one in settings.items() if f in ("", reading)}
+
+
+def _name(id: str) -> str:
+    """Return the name of the parameter that holds a choice."""
+    return register()[id].field.split(".")[1]
+
+
+# --- mazes and demonstrations that are not stored ------------------------------------------------
+
+
+@cache
+def _maze_demos(world: str, expert: Expert) -> Demos:
+    task, maze = _world(world)
+    return demonstrate(task, maze, params=expert)
+
+
+@cache
+def _world(world: str) -> tuple[str, Maze]:
+    """Return the name of a maze's task, and the maze."""
+    stored = {"open": "open-maze", "obstacles": "obstacle-maze"}
+    if world in stored:
+        return stored[world], load_demos(resolve(EXPERIMENTS[stored[world]].demos)).maze
+    task = f"{world}-maze"
+    template = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    shapes = register()["DEMO-SHAPE"]
+    experts = [Expert(leg=int(leg)) for leg in (shapes.default, *shapes.alternatives)]
+    experts.append(Expert(path="random-1"))
+    seed = np.random.SeedSequence(int(world.removeprefix("random-")))
+    for maze in random_mazes(template.maze, seed=seed):
+        kinds = (demonstrate(task, maze, params=one).kinds for one in experts)
+        if all(set(one) == set(template.kinds) for one in kinds):
+            return task, maze
+    raise AssertionError("random mazes do not end")
+
+
+def random_mazes(
+    template: Maze, *, obstacles: int = OBSTACLES, moves: int = MOVES, seed: np.random.SeedSequence
+) -> Iterator[Maze]:
+    """Yield random mazes whose shortest path has the given number of moves, without end.
+
+    Parameters
+    ----------
+    template
+        Gives the size, the start and the goal; its obstacles are not kept.
+    obstacles
+        Number of obstacle cells, drawn without replacement from all others.
+    moves
+        Length of the shortest path.
+    seed
+        Of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    rows, columns = template.shape
+    free = [cell for cell in range(rows * columns) if cell not in (template.start, template.goal)]
+    while True:
+        cells = np.full(rows * columns, ".")
+        cells[rng.choice(free, size=obstacles, replace=False)] = "#"
+        cells[[template.start, template.goal]] = "S", "G"
+        try:
+            maze = Maze(tuple("".join(row) for row in cells.reshape(rows, columns)))
+        except ValueError:  # the goal cannot be reached
+            continue
+        if maze.distances()[maze.start] == moves:
+            yield maze
+
+
+def numbered_settings(ablations: Ablations, cap: int) -> dict[tuple[int, str], Setting]:
+    """Return settings with ever more incorrect demonstrations, from none to all pairs.
+
+    Keys are the number of demonstrations and the reading of Eq. 9.
+    """
+    demos = _maze_demos("open", Expert())
+    every = _each_wrong_pair(demos, np.random.SeedSequence(ablations.seed))
+    found = {}
+    for number in ablations.numbers:
+        n = len(every) if number == "all" else number
+        some = replace(demos, incorrect=tuple(every[:n]))
+        method = "unified-incorrect" if n else "unified"
+        for f in ("printed", "updated"):
+            params = Params.of(f_index=f, max_iterations=cap, incorrect="all" if n else "none")
+            found[n, f] = Setting(some, method, params)
+    return found
+
+
+def _each_wrong_pair(demos: Demos, seed: np.random.SeedSequence) -> list[Demo]:
+    """Return a demonstration of each pair that the expert does not take, in random order.
+
+    It is a shortest path from the start to the pair's state, and then the pair's action.
+    """
+    maze = demos.maze
+    right = visited(demos.correct, shape=(maze.n_states, maze.n_actions))
+    ways: dict[int, list[int]] = {maze.start: []}
+    waiting = [maze.start]
+    for state in waiting:  # grows while it is read
+        for action, there in enumerate(maze.next_state[state].tolist()):
+            if there not in ways and state != maze.goal:
+                ways[there] = [*ways[state], action]
+                waiting.append(there)
+    pairs = [
+        (state, action)
+        for state in ways
+        if state != maze.goal
+        for action in range(maze.n_actions)
+        if not right[state, action]
+    ]
+    order = np.random.default_rng(seed).permutation(len(pairs))
+    found = []
+    for number, (state, action) in enumerate(pairs[at] for at in order.tolist()):
+        actions = [*ways[state], action]
+        found.append(Demo(f"pair-{number}", "pair", maze.replay(actions), np.array(actions)))
+    return found
