@@ -10,18 +10,21 @@ unexport PYTHONPATH PYTHONHOME
 # Nor may a local store of packages decide which versions and files the lock names.
 unexport UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
-.PHONY: help reproduce quick test bench lint readme lock clean
+.PHONY: help reproduce sensitivity quick test bench lint readme lock clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-11s%s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-13s%s\n", $$1, $$2 }' Makefile
 	@echo 'The first target builds $(VENV) from environment.lock; PYTHON=python3.12 names its interpreter.'
 
 reproduce: $(VENV)/.ready ## run everything in the paper and judge each claim
-	$(VENV)/bin/replicate run --profile paper
+	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile paper
 
-quick: $(VENV)/.ready ## the tasks with few trials, into build/quick
-	$(VENV)/bin/replicate run obstacle_maze open_maze soccer --profile quick --out build/quick
+sensitivity: $(VENV)/.ready ## what the verdicts depend on: the claims under hundreds of other choices
+	$(VENV)/bin/replicate run calibration sensitivity --profile paper
+
+quick: $(VENV)/.ready ## the paper with few trials, into build/quick
+	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile quick --out build/quick
 
 test: $(VENV)/.ready ## run the tests
 	$(RUN) -m pytest

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from replication.choices import Value, register
 from replication.envs.maze import Maze
@@ -19,7 +20,7 @@ from replication.expert import demonstrate
 from replication.paper import TABLE_1, Published
 from replication.params import Expert, Params
 from replication.setting import Setting
-from replication.statistics import summarise
+from replication.statistics import mean_prediction, summarise
 from replication.trials import Results
 
 CALIBRATED = ("DEMO-SHAPE", "ALPHA", "F-START", "TIES")
@@ -85,6 +86,33 @@ def divergence(mean: float, sd: float, published: Published) -> float:
         return float("inf")
     spread = published.sd**2 + (published.mean - mean) ** 2
     return float(np.log(sd / published.sd) + spread / (2 * sd**2) - 0.5)
+
+
+def findings(table: pd.DataFrame) -> str:
+    """Return in words how well the pair is met, and how little it decides."""
+    best = table.iloc[0]
+    n = int(best["n"])
+    low, high = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, n)
+    least, most = PAIR.sd * np.sqrt(stats.f.ppf([0.025, 0.975], n - 1, PAIR.n - 1))
+    near = table[
+        table["mean"].between(low, high) & table["sd"].between(least, most) & (table["capped"] == 0)
+    ]
+    values = "; ".join(
+        f"{id}: {', '.join(map(str, sorted(near[id].unique())))}" for id in CALIBRATED
+    )
+    ours = "our default" if best["default"] else "NOT our default"
+    return (
+        f"The nearest point is {ours}: {_named(best)}, with a mean of {best['mean']:.2f} "
+        f"(SD {best['sd']:.2f}) in {n} trials, where the paper has {PAIR.mean:.2f} ({PAIR.sd:.2f})."
+        f" But {len(near)} of the {len(table)} points have a mean and an SD where those of {n} "
+        f"trials from the published distribution would lie with 95 % each ({low:.1f} to "
+        f"{high:.1f}, and {least:.1f} to {most:.1f}). They have these values: {values}. So the "
+        "pair narrows the choices down and does not decide them."
+    )
+
+
+def _named(row: pd.Series) -> str:
+    return ", ".join(f"{id} = {row[id]}" for id in CALIBRATED)
 
 
 def calibration_table(results: Results, settings: Mapping[Point, Setting]) -> pd.DataFrame:

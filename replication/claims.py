@@ -16,6 +16,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from replication.choices import unknown_name
 from replication.irl import METHODS
 from replication.paper import Published
 
@@ -81,6 +82,8 @@ class Claim(_Strict):
             raise ValueError(f"paper.{self.x} is missing")
         if self.statistic in ("mean-difference", "sd-ratio") and not self.y:
             raise ValueError(f"{self.statistic!r} needs y")
+        if self.paper and self.y and not {self.x, self.y} <= set(self.paper):
+            raise ValueError(f"paper has to have both {self.x!r} and {self.y!r}, or neither")
         return self
 
     def published(self, method: str) -> Published:
@@ -138,6 +141,19 @@ class Claims(_Strict):
             raise ValueError(f"root seed {seed} was explored; judge by one that never was")
         return self
 
+    def by_id(self, id: str) -> Claim:
+        """Return one claim.
+
+        Raises
+        ------
+        ClaimError
+            If there is none with that id.
+        """
+        known = {one.id: one for one in self.claim}
+        if id not in known:
+            raise ClaimError(str(unknown_name(id, list(known), "claim")))
+        return known[id]
+
 
 @cache
 def claims() -> Claims:
@@ -168,7 +184,7 @@ def parse_claims(text: str) -> Claims:
             place[:2] = [f"claim {name}"]
         where = ", ".join(["claims.toml", ".".join(map(str, place))] if place else ["claims.toml"])
         said = first["msg"].removeprefix("Value error, ")
-        if first["type"] != "value_error":
+        if first["type"] not in ("value_error", "missing"):
             said += f", not {first['input']!r:.80}"
         raise ClaimError(f"{where}: {said}") from None
 

@@ -162,12 +162,17 @@ def run(
             plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
             typer.echo(error.details if sys.stderr.isatty() else plain, err=True)
         _fail(str(error), 1)
-    tables = [path for path in published if path.suffix == ".md"]
-    for table in sorted(tables, key=lambda path: path.stem.endswith("_claims")):  # verdicts last
-        typer.echo(f"\n{table.name}\n\n{table.read_text(encoding='utf-8').strip()}")
+    for table in published:
+        if table.suffix == ".md" and table.stem != "claims":
+            typer.echo(f"\n{table.name}\n\n{table.read_text(encoding='utf-8').strip()}")
     executed = paths.PROJECT / "build" / "executed" / name
     typer.echo(f"\noutputs ({len(published)}): {_short(target)}")
     typer.echo(f"executed notebooks: {_short(executed)}")
+    if target / "claims.csv" in published:
+        from replication.tables import read_table, verdict_lines
+
+        lines = verdict_lines(read_table(target / "claims.csv"))
+        typer.echo("\nThe paper's claims:\n" + "\n".join(lines))
 
 
 @app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")

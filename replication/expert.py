@@ -23,7 +23,6 @@ INCORRECT-NUMBER).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 from heapq import heappop, heappush
 from itertools import pairwise
 
@@ -188,8 +187,8 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
         if not all(0 <= x < size for x, size in zip(point, maze.shape, strict=True)):
             continue
         a, b, c = int(path[leave]), maze.state(*point), int(path[join])
-        out = _ways(maze, a, frozenset(path.tolist()) - {a, b}).get(b)
-        home = out and _ways(maze, b, frozenset(path.tolist()) - {b, c}).get(c)
+        out = _way(maze, a, b, set(path.tolist()) - {a, b})
+        home = out and _way(maze, b, c, set(path.tolist()) - {b, c})
         way = [*(out or []), *(home or [])]
         if out and home and all(b != OPPOSITE[a] for a, b in pairwise(way)):
             return correct[:leave] + way + correct[join:]
@@ -201,24 +200,24 @@ def _beside(point: tuple[int, int], action: int) -> tuple[int, int]:
     return point[0] + down, point[1] + right
 
 
-@lru_cache(maxsize=64)
-def _ways(maze: Maze, source: int, avoid: frozenset[int]) -> dict[int, list[int]]:
-    """Return for each state the shortest way to it that keeps off `avoid`.
+def _way(maze: Maze, source: int, target: int, avoid: set[int]) -> list[int] | None:
+    """Return the shortest way that keeps off `avoid`, or None.
 
     Among the shortest it is one with the fewest turns; ties in the order of the actions.
     """
+    next_state = maze.next_state.tolist()
     done: set[tuple[int, int]] = set()
-    reached: dict[int, list[int]] = {}
     heap: list[tuple[int, int, list[int], int]] = [(0, 0, [], source)]
     while heap:
         moves, turns, actions, state = heappop(heap)
+        if state == target:
+            return actions
         last = actions[-1] if actions else -1
         if (state, last) in done:
             continue
         done.add((state, last))
-        reached.setdefault(state, actions)
-        for action, there in enumerate(maze.next_state[state].tolist()):
+        for action, there in enumerate(next_state[state]):
             if there != state and there not in avoid and (there, action) not in done:
                 turned = last not in (-1, action)
                 heappush(heap, (moves + 1, turns + turned, [*actions, action], there))
-    return reached
+    return None

@@ -370,15 +370,17 @@ def _draw_map(panel: Axes, maze: Maze) -> None:
     x, y = _places(maze, np.flatnonzero(~maze.free))
     for left, bottom in zip(x, y, strict=True):
         panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=OBSTACLE_COLOUR, lw=0))
-    for state, colour, letter in (
-        (maze.start, START_COLOUR, "S"),
-        (maze.goal, GOAL_COLOUR, "G"),
+    for state, colour, letter, side in (
+        (maze.start, START_COLOUR, "S", -1),
+        (maze.goal, GOAL_COLOUR, "G", 1),
     ):
         ((left,), (bottom,)) = _places(maze, np.array([state]))
         panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=colour, alpha=0.55, lw=0))
-        panel.annotate(
-            letter, (left, bottom), (0, -9), textcoords="offset points", ha="center", va="center"
-        )
+        # Paths run through the middles of cells: at a corner, inside the map, none covers it.
+        across = side if 0 <= left + side < n_columns else -side
+        upwards = side if 0 <= bottom + side < n_rows else -side
+        corner = (left + across / 2, bottom + upwards / 2)
+        panel.text(*corner, letter, size=7.5, ha="center", va="center_baseline", zorder=6)
     for line in range(n_columns + 1):
         panel.axvline(line - 0.5, color="0.9", lw=0.4, zorder=0)
     for line in range(n_rows + 1):

@@ -17,12 +17,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from replication.choices import ChoiceError, Value, register
 from replication.claims import ClaimError, claims
-from replication.comparisons import EXPERIMENTS, Key, method_settings
+from replication.comparisons import EXPERIMENTS, F_INDICES, F_LABELS, Key, method_settings
 from replication.demos import Demo, Demos, load_demos
 from replication.envs.field import SoccerField
 from replication.envs.maze import Maze
 from replication.expectations import visited
 from replication.expert import demonstrate
+from replication.irl import METHODS
 from replication.params import Expert, Params, SoccerExpert
 from replication.paths import resolve
 from replication.setting import Setting
@@ -128,10 +129,11 @@ def parse_specifications(text: str) -> Declared:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise ChoiceError(f"specifications.toml, {place}: {first['msg']}") from None
-    known = {one.id for one in claims().claim}
     for id in (*found.mazes.claims, *found.soccer.claims):
-        if id not in known:
-            raise ClaimError(f"specifications.toml: there is no claim {id!r}")
+        try:
+            claims().by_id(id)
+        except ClaimError as error:
+            raise ClaimError(f"specifications.toml: {error}") from None
     tables = {
         "mazes.single": found.mazes.single.choices,
         "mazes.factorial": found.mazes.factorial.choices,
@@ -164,7 +166,9 @@ def _check(id: str, value: Value) -> None:
             raise ChoiceError(f"MAP = {value!r} is not accepted: use {', '.join(MAPS)}")
     elif id not in register():
         raise ChoiceError(f"there is no choice {id!r}")
-    elif not (id, value) == ("DEMO-SHAPE", RANDOM) and id != "SOCCER-EPISODES":
+    elif id == "SOCCER-EPISODES":
+        register()["EPISODES"].check(value)
+    elif (id, value) != ("DEMO-SHAPE", RANDOM):
         if not register()[id].field:
             raise ChoiceError(f"{id} has no parameter that could be changed")
         register()[id].check(value)
@@ -312,6 +316,25 @@ def random_mazes(
             yield maze
 
 
+def trace_settings(ablations: Ablations, cap: int) -> dict[str, Setting]:
+    """Return the default and the ablations of the trace, by what they are.
+
+    They are those of the unified method without and with incorrect demonstrations, under both
+    readings of Eq. 9. While the trace stays as it is, the readings differ in marked pairs alone.
+    """
+    found = {}
+    for changed in ({}, *ablations.traces):
+        choices = tuple(changed.items())
+        for reading in F_INDICES:
+            one = Specification("ablation", (*choices, ("F-INDEX", reading)))
+            for (method, _), setting in maze_settings(one, cap).items():
+                if method != "adaboost":
+                    name = Specification("ablation", choices).name
+                    label = METHODS[method].label
+                    found[f"{label}, {F_LABELS[reading]}, {name}"] = setting
+    return found
+
+
 def numbered_settings(ablations: Ablations, cap: int) -> dict[tuple[int, str], Setting]:
     """Return settings with ever more incorrect demonstrations, from none to all pairs.
 
@@ -324,7 +347,7 @@ def numbered_settings(ablations: Ablations, cap: int) -> dict[tuple[int, str], S
         n = len(every) if number == "all" else number
         some = replace(demos, incorrect=tuple(every[:n]))
         method = "unified-incorrect" if n else "unified"
-        for f in ("printed", "updated"):
+        for f in F_INDICES:
             params = Params.of(f_index=f, max_iterations=cap, incorrect="all" if n else "none")
             found[n, f] = Setting(some, method, params)
     return found

@@ -18,6 +18,7 @@ from scipy import stats
 
 CONFIDENCE = 0.95
 RESAMPLES = 9999
+RESAMPLES_OF_MANY = 1999
 BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
 
 FEWEST = 30
@@ -143,6 +144,51 @@ def _sd_ratio(
     a: NDArray[np.float64], b: NDArray[np.float64], axis: int = -1
 ) -> NDArray[np.float64]:
     return np.std(a, axis=axis, ddof=1) / np.std(b, axis=axis, ddof=1)
+
+
+def mean_intervals(samples: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the BCa intervals of many means at once: bounds [sample] of values [sample, trial]."""
+    return _bootstrap_many((samples,), np.mean)
+
+
+def sd_ratio_intervals(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return many ratios of SDs at once, with their BCa intervals; NaN where either is constant."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = _sd_ratio(x, y)
+    low, high = _bootstrap_many((x, y), _sd_ratio)
+    bounds = np.array([ratio, low, high])
+    bounds[:, ~np.isfinite(bounds).all(axis=0) | (ratio == 0)] = np.nan
+    return bounds[0], bounds[1], bounds[2]
+
+
+def standard_errors(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard errors that intervals imply, if estimates are about normal."""
+    return (high - low) / (2 * _normal())
+
+
+def _bootstrap_many(
+    samples: tuple[NDArray[np.float64], ...], statistic: Callable[..., Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return BCa intervals row by row; a statistic that no resample changes is its own interval."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.bootstrap(
+            samples,
+            statistic,
+            axis=-1,
+            paired=True,
+            vectorized=True,
+            confidence_level=CONFIDENCE,
+            n_resamples=RESAMPLES_OF_MANY,
+            method="BCa",
+            rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
+        )
+        estimate = statistic(*samples, axis=-1)
+        flat = np.ptp(found.bootstrap_distribution, axis=-1) == 0
+    low = np.where(flat, estimate, found.confidence_interval.low)
+    return low, np.where(flat, estimate, found.confidence_interval.high)
 
 
 def _bootstrap(

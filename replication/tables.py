@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,7 @@ from replication.statistics import (
     mean_prediction,
     summarise,
 )
+from replication.verdicts import NOT_TESTABLE, REPRODUCED, overall
 
 
 def rows_of(trials: pd.DataFrame, setting: Setting) -> pd.DataFrame:
@@ -80,43 +82,46 @@ def summary_table(
     return pd.DataFrame(rows)
 
 
-def rules_table(
-    trials: pd.DataFrame, rules: Mapping[str, Setting], unified: Mapping[str, Setting]
-) -> pd.DataFrame:
-    """Return one row for each reading of AdaBoost-IRL, compared with the unified method.
+PAIRS = (("unified", "adaboost"), ("unified-incorrect", "unified"))
+"""What is compared: the first method of each with the second."""
 
-    Parameters
-    ----------
-    trials
-        Tidy trials of all of them.
-    rules
-        Settings of AdaBoost-IRL by the reading's name.
-    unified
-        Settings of the unified method by the reading of Eq. 9.
+
+def contrasts_table(trials: pd.DataFrame, settings: Mapping[Key, Setting]) -> pd.DataFrame:
+    """Return the methods compared in pairs, trial by trial, under both readings of Eq. 9.
+
+    One row a pair and reading, with everything in :class:`replication.statistics.Comparison`. These
+    are effects with their intervals; the verdicts on the paper's claims are those of
+    :mod:`replication.verdicts`, which also adjusts for the number of tests.
     """
     rows = []
-    for rule, setting in rules.items():
-        own = rows_of(trials, setting)
-        row = {"rule": rule, **asdict(summarise(own["iterations"], own["converged"]))}
-        for f, other in unified.items():
-            row[f"fewer_{f}"] = comparison(trials, other, setting).fewer
-        rows.append(row)
+    for one, other in PAIRS:
+        for f in dict.fromkeys(f for method, f in settings if method == one):
+            y = settings.get((other, f), settings.get((other, "")))
+            if y is not None:
+                found = asdict(comparison(trials, settings[one, f], y))
+                del found["power"]
+                rows.append({"x": one, "y": other, "F": f, **found})
     return pd.DataFrame(rows)
 
 
-def readable_rules(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of readings of AdaBoost-IRL as a reader wants it."""
-    readable = table[["rule"]].rename(columns={"rule": "Reading"})
-    readable["Mean (SD)"] = [
-        f"{_number(mean)} ({_number(sd)})"
-        for mean, sd in zip(table["mean"], table["sd"], strict=True)
+def readable_contrasts(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of contrasts as a reader wants it."""
+    labels = [
+        f"{get_method(x).label} against {get_method(y).label}"
+        for x, y in zip(table["x"], table["y"], strict=True)
     ]
-    readable["Median (quartiles)"] = _quartiles(table)
-    readable["At the cap"] = [
-        f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    readable = pd.DataFrame({"Compared": labels, "F": table["F"].map(F_LABELS)})
+    readable["Iterations [95 %]"] = [
+        _interval(*row)
+        for row in zip(table["difference"], table["low"], table["high"], strict=True)
     ]
-    for f in F_INDICES:
-        readable[f"P(unified fewer), {F_LABELS[f]}"] = table[f"fewer_{f}"].map(_number)
+    readable["SD × [95 %]"] = [
+        _interval(*row)
+        for row in zip(table["sd_ratio"], table["sd_low"], table["sd_high"], strict=True)
+    ]
+    readable["P(fewer)"] = table["fewer"].map(_number)
+    readable["p, signed rank"] = table["p_wilcoxon"].map(_p)
+    readable["p, spread"] = table["p_spread"].map(_p)
     return readable
 
 
@@ -220,6 +225,101 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
     return readable.rename(columns={key: key.capitalize() for key in keys})
 
 
+def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
+    """Return judged claims as a reader wants them: one row a claim, both readings side by side."""
+    rows = []
+    for _, part in table.groupby("id", sort=False):
+        first = part.iloc[0]
+        own = {row.F: row for row in part.itertuples()}
+        row = {"Claim": first["claim"], "Place": first["place"], "Paper": _paper(first)}
+        for f in F_INDICES:
+            one = own.get(f, own.get("") if f == F_INDICES[0] else None)
+            row[F_LABELS[f]] = "–" if one is None else _effect(one)
+        rows.append({**row, "Verdict": _verdict(part)})
+    return pd.DataFrame(rows)
+
+
+def verdict_lines(table: pd.DataFrame) -> list[str]:
+    """Return judged claims for a terminal: a line each, the verdict first."""
+    lines = []
+    for _, part in table.groupby("id", sort=False):
+        verdict = overall(part["verdict"].tolist())
+        first = part.iloc[0]
+        lines.append(f"{verdict:<15}{first['claim']} ({first['place']})")
+    return lines
+
+
+def _verdict(part: pd.DataFrame) -> str:
+    """Return the verdict on a claim, and where its readings differ or give none, why."""
+    verdict = overall(part["verdict"].tolist())
+    if part["verdict"].nunique() > 1:
+        each = (f"{F_LABELS[row.F].split()[0]} {row.verdict}" for row in part.itertuples())
+        verdict = f"{verdict} ({', '.join(each)})"
+    elif verdict == NOT_TESTABLE:
+        verdict = f"{verdict}: {part['why'].iloc[0]}"
+    return f"**{verdict}**" if verdict == REPRODUCED else verdict
+
+
+def _paper(row: pd.Series) -> str:
+    if np.isnan(row["paper"]):
+        return "–"
+    return f"× {row['paper']:.2f}" if row["statistic"] == "sd-ratio" else f"{row['paper']:.2f}"
+
+
+def _effect(row: Any) -> str:
+    """Return an effect with its interval, in the unit of its statistic."""
+    if np.isnan(row.effect):
+        return "–"
+    if row.statistic == "published-run":
+        return f"median {row.effect:g}; {row.low:.0f} to {row.high:.0f}"
+    text = _interval(row.effect, row.low, row.high)
+    return f"× {text}" if row.statistic == "sd-ratio" else text
+
+
+def readable_outcomes(table: pd.DataFrame) -> pd.DataFrame:
+    """Return in how many specifications each claim holds, as a reader wants it."""
+    groups = {"single": "one at a time", "factorial": "all at once"}
+    readable = pd.DataFrame({"Claim": table["claim"], "Choices": table["group"].map(groups)})
+    for name in ("specifications", "holds", "open", "reversed", "undefined"):
+        readable[name.capitalize()] = table[name]
+    readable["With capped trials"] = table["with_caps"]
+    readable["Effect: median (least, largest)"] = [
+        f"{row.median:.2f} ({row.lowest:.2f}, {row.highest:.2f})" for row in table.itertuples()
+    ]
+    return readable
+
+
+def readable_levels(table: pd.DataFrame, claim: str) -> pd.DataFrame:
+    """Return what goes with each value of each choice for one claim, as a reader wants it."""
+    own = table[table["claim"] == claim]
+    return pd.DataFrame(
+        {
+            "Choice": own["choice"],
+            "Value": [
+                f"{row.value} (default)" if row.default else str(row.value)
+                for row in own.itertuples()
+            ],
+            "Mean effect": own["mean_effect"].map(_number),
+            "Holds": own["holds"].map("{:.0%}".format),
+            "Reversed": own["reversed"].map("{:.0%}".format),
+        }
+    )
+
+
+def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of ablations as a reader wants it."""
+    readable = pd.DataFrame({"Setting": table["setting"]})
+    readable["Mean [95 %]"] = [
+        _interval(*row) for row in zip(table["mean"], table["low"], table["high"], strict=True)
+    ]
+    readable["SD"] = table["sd"].map(_number)
+    readable["Median"] = table["median"].map("{:g}".format)
+    readable["At the cap"] = [
+        f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    ]
+    return readable
+
+
 def markdown(table: pd.DataFrame) -> str:
     """Return a table as Markdown, with columns that line up as text, too."""
     rows = [list(map(str, row)) for row in (table.columns, *table.itertuples(index=False))]
@@ -232,6 +332,15 @@ def markdown(table: pd.DataFrame) -> str:
 def write_csv(table: pd.DataFrame, path: Path) -> Path:
     """Write a table as CSV: ten significant digits, the same on every platform."""
     return write_file(path, table.to_csv(index=False, float_format="%.10g", lineterminator="\n"))
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Read a table that was written as CSV; what is empty is NaN in columns of numbers only."""
+    table = pd.read_csv(path, keep_default_na=False, na_values=[""])
+    for name in table:
+        if table[name].dtype.kind not in "fiub" or name == "F":
+            table[name] = table[name].astype(object).where(table[name].notna(), "")
+    return table
 
 
 def write_trials(trials: pd.DataFrame, path: Path) -> Path:

@@ -49,6 +49,8 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
     rows = []
     for claim in claims.claim:
         x = measures[(measures["task"] == claim.task) & (measures["method"] == claim.x)]
+        if x.empty:
+            raise KeyError(f"no trials of {claim.x} on {claim.task}")
         for f in [f for f in (*claims.judging.readings, "") if f in set(x["F"])]:
             rows.append(_row(claim, f, measures, claims.judging))
     table = pd.DataFrame(rows)

@@ -109,10 +109,10 @@ def test_only_the_paper_as_it_is_goes_to_figures(
     assert len(list(project.rglob("build/executed/*/toy.ipynb"))) == 1
 
 
-def test_claims_are_shown_last(project: Path) -> None:
-    """Each table has its name, those of claims stand at the end, and shared files count once."""
+def test_tables_are_shown_by_their_names(project: Path) -> None:
+    """Each table has its name, in the order of the notebooks, and shared files count once."""
     for name in ("a", "b"):
-        tables = [f"{name}.md", f"{name}_claims.md"]
+        tables = [f"{name}.md", f"{name}_sets.md"]
         cells = [
             new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
             new_code_cell(
@@ -125,9 +125,42 @@ def test_claims_are_shown_last(project: Path) -> None:
         nbformat.write(node, project / "notebooks" / f"{name}.ipynb")
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
-    names = ["a.md", "b.md", "a_claims.md", "b_claims.md"]
-    assert titles == [(name, name) for name in names]
+    assert titles == [(name, name) for name in ("a.md", "a_sets.md", "b.md", "b_sets.md")]
     assert "\noutputs (5): " in shown
+    assert "claims" not in shown
+
+
+@pytest.mark.parametrize("out", [None, "elsewhere"])
+def test_claims_are_shown_last(
+    project: Path, monkeypatch: pytest.MonkeyPatch, out: str | None
+) -> None:
+    """A run that judges the claims ends with a line for each of them, the verdict first."""
+    table = (
+        "id,claim,place,F,verdict\n"
+        "A,It is faster,Table I,printed,reproduced\n"
+        "A,It is faster,Table I,updated,undecided\n"
+        "B,It is steadier,Fig. 6,,not testable\n"
+    )
+    cells = [
+        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
+        new_code_cell(
+            "from pathlib import Path\nfolder = Path(out)\n"
+            f"(folder / 'claims.csv').write_text({table!r})\n"
+            "(folder / 'claims.md').write_text('| long table |\\n')"
+        ),
+    ]
+    declared = {"outputs": ["claims.csv", "claims.md"]}
+    node = new_notebook(cells=cells, metadata={"replication": declared})
+    nbformat.write(node, project / "notebooks" / "claims.ipynb")
+    monkeypatch.chdir(project)
+    shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
+    assert "long table" not in shown
+    assert shown.index("executed notebooks: ") < shown.index("The paper's claims:")
+    assert shown.splitlines()[-3:] == [
+        "The paper's claims:",
+        "partly         It is faster (Table I)",
+        "not testable   It is steadier (Fig. 6)",
+    ]
 
 
 def test_failing_cell_shows_its_traceback(project: Path) -> None:

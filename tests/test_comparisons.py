@@ -3,186 +3,178 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from replication import Demos, load_demos
+from replication import Demos
 from replication.choices import ChoiceError
+from replication.claims import claims, criteria_hash
 from replication.comparisons import (
+    EXPERIMENTS,
     F_INDICES,
     SETS,
-    SOCCER_CLAIMS,
-    TABLE_1_CLAIMS,
-    TABLE_2_CLAIMS,
-    Claim,
     Key,
     method_settings,
     rule_settings,
     set_settings,
-    soccer_readings,
 )
-from replication.paper import SOCCER, SOCCER_CURVES, TABLE_1, TABLE_2, Published
+from replication.measures import measure_trials
+from replication.paper import SOCCER_CURVES, TABLE_1, TABLE_2
 from replication.paths import PROJECT
+from replication.sensitivity import effects_table
 from replication.setting import Setting
+from replication.specifications import declared, maze_settings, single_specifications
 from replication.store import Store
-from replication.tables import claims_table, rows_of, sets_table, summary_table
-from replication.trials import run_trials
+from replication.tables import (
+    contrasts_table,
+    markdown,
+    read_table,
+    readable_verdicts,
+    rows_of,
+    sets_table,
+    summary_table,
+)
+from replication.trials import Results, run_trials
+from replication.verdicts import judge_claims
 
 FIGURES = PROJECT / "figures"
-TRIALS = 100
-ROOT = 1
+ROOT = claims().judging.root_seed
+JOBS = os.cpu_count() or 1
+TRIALS = {"open-maze": 100, "obstacle-maze": 100, "soccer": 30}
+"""Recomputed here; soccer has 60 published ones."""
+
+TABLES = {"open-maze": "table1", "obstacle-maze": "table2", "soccer": "soccer"}
+PUBLISHED = {"open-maze": TABLE_1, "obstacle-maze": TABLE_2, "soccer": SOCCER_CURVES}
+
+Recomputed = tuple[str, dict[Key, Setting], Results]
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """One maze: its settings, recomputed trials, and the files that hold its results."""
-
-    settings: dict[Key, Setting]
-    sets: dict[Key, Setting]
-    trials: pd.DataFrame
-    table: str
-    claims: tuple[Claim, ...]
-    published: dict[str, Published]
-
-
-@pytest.fixture(scope="module", params=["open_maze", "obstacle_maze"])
-def experiment(
+@pytest.fixture(scope="module", params=list(EXPERIMENTS))
+def recomputed(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Experiment:
-    """Run 100 trials of every method of Tables I and II, from nothing."""
-    demos = load_demos(PROJECT / "data" / "demos" / f"{request.param}.json")
-    settings = method_settings(demos, {})
+) -> Recomputed:
+    """Run the trials of one experiment from nothing."""
+    settings = EXPERIMENTS[request.param].settings()
     store = Store(tmp_path_factory.mktemp("store") / "trials.sqlite")
-    results = run_trials(
-        list(settings.values()), trials=TRIALS, store=store, jobs=os.cpu_count() or 1, seed=ROOT
-    )
-    number, claims, published = {
-        "open_maze": ("1", TABLE_1_CLAIMS, TABLE_1),
-        "obstacle_maze": ("2", TABLE_2_CLAIMS, TABLE_2),
-    }[request.param]
-    sets = set_settings(demos, {})
-    return Experiment(settings, sets, results.frame(), f"table{number}", claims, published)
+    trials = TRIALS[request.param]
+    results = run_trials(list(settings.values()), trials=trials, store=store, jobs=JOBS, seed=ROOT)
+    return request.param, settings, results
 
 
-def _stored(name: str) -> pd.DataFrame:
-    return pd.read_csv(FIGURES / name, keep_default_na=False, na_values=[""], dtype={"F": str})
-
-
-def test_every_trial_reaches_zero(experiment: Experiment) -> None:
-    """Figs. 5 and 9: the error of every one of the 100 trials falls to zero, in every method."""
-    assert experiment.trials["converged"].all()
-
-
-def test_published_trials_are_what_the_code_computes(experiment: Experiment) -> None:
-    """Row by row, figures/trials.csv holds the iterations that the code gives now."""
-    stored = pd.read_csv(FIGURES / "trials.csv", keep_default_na=False)
-    for setting in experiment.settings.values():
-        ours = rows_of(experiment.trials, setting)["iterations"].tolist()
-        assert rows_of(stored, setting)["iterations"].tolist()[:TRIALS] == ours
-
-
-def test_verdicts_are_those_published(experiment: Experiment) -> None:
-    """Tables I and II, Figs. 6 and 9: each recomputed verdict equals the stored one."""
-    ours = claims_table(
-        experiment.trials, experiment.settings, experiment.claims, experiment.published
-    )
-    stored = _stored(f"{experiment.table}_claims.csv")
-    assert ours["claim"].tolist() == stored["claim"].tolist()
-    assert ours["verdict"].tolist() == stored["verdict"].tolist()
-    assert "not testable" not in set(ours["verdict"])
-
-
-def test_published_comparisons_have_power(experiment: Experiment) -> None:
-    """With 100 trials an effect as large as the paper's would be found in four cases of five."""
-    ours = claims_table(
-        experiment.trials, experiment.settings, experiment.claims, experiment.published
-    )
-    compared = ours[(ours["judged"] == "fewer") & ours["paper_effect"].notna()]
-    assert not compared.empty
-    assert (compared["power"] > 0.8).all()
-
-
-def _assert_same(stored: pd.DataFrame, computed: pd.DataFrame) -> None:
+def assert_same(stored: pd.DataFrame, computed: pd.DataFrame) -> None:
     """Compare all columns; the file has ten significant digits and writes nothing for NaN."""
     assert stored.columns.tolist() == computed.columns.tolist()
     for name in computed:
         if computed[name].dtype.kind in "fiu":
             expected = computed[name].astype(float).tolist()
             found = pd.to_numeric(stored[name]).astype(float).tolist()
-            assert found == pytest.approx(expected, nan_ok=True, rel=1e-8), name
+            assert found == pytest.approx(expected, nan_ok=True, rel=1e-8, abs=1e-12), name
         else:
             assert stored[name].fillna("").tolist() == computed[name].tolist(), name
 
 
-def test_published_tables_follow_from_published_trials(experiment: Experiment) -> None:
-    """Every column of the tables, p-values and verdicts included, follows from trials.csv."""
-    trials = pd.read_csv(FIGURES / "trials.csv", keep_default_na=False)
-    main = trials[trials["trial"] < TRIALS]
-    name, published = experiment.table, experiment.published
-    _assert_same(_stored(f"{name}.csv"), summary_table(main, experiment.settings, published))
-    claims = claims_table(main, experiment.settings, experiment.claims, published)
-    _assert_same(_stored(f"{name}_claims.csv"), claims)
-    task = experiment.trials["task"].iloc[0].replace("-", "_")
-    few = trials[trials["trial"] < len(rows_of(trials, experiment.sets["opposite", "printed"]))]
-    _assert_same(_stored(f"{task}_sets.csv"), sets_table(few, experiment.sets))
-
-
-@pytest.fixture(scope="module")
-def soccer() -> dict[Key, Setting]:
-    """Return the settings of Fig. 12."""
-    demos = load_demos(PROJECT / "data" / "demos" / "soccer.json")
-    return method_settings(demos, {**SOCCER, "incorrect": "all"}, ["unified", "unified-incorrect"])
-
-
-def test_published_soccer_trials_are_what_the_code_computes(
-    soccer: dict[Key, Setting], tmp_path: Path
-) -> None:
-    """Robot soccer, 30 trials of each setting: every error reaches zero, in the stored number."""
-    stored = pd.read_csv(FIGURES / "trials.csv", keep_default_na=False)
-    jobs = os.cpu_count() or 1
-    results = run_trials(
-        list(soccer.values()), trials=30, store=Store(tmp_path / "s"), jobs=jobs, seed=ROOT
-    )
-    assert results.frame()["converged"].all()
-    for setting in soccer.values():
+def test_published_trials_are_what_the_code_computes(recomputed: Recomputed) -> None:
+    """Row by row, figures/trials.csv holds the iterations that the code gives now."""
+    task, settings, results = recomputed
+    stored = read_table(FIGURES / "trials.csv")
+    for setting in settings.values():
         ours = results.iterations(setting).tolist()
-        assert rows_of(stored, setting)["iterations"].tolist()[:30] == ours
+        assert rows_of(stored, setting)["iterations"].tolist()[: TRIALS[task]] == ours
 
 
-def test_verdict_on_fig_12_follows_from_published_trials(soccer: dict[Key, Setting]) -> None:
-    """The soccer tables follow from trials.csv, and the effect of the paper would be found."""
-    trials = pd.read_csv(FIGURES / "trials.csv", keep_default_na=False)
-    claims = claims_table(trials, soccer, SOCCER_CLAIMS, SOCCER_CURVES)
-    _assert_same(_stored("soccer_claims.csv"), claims)
-    _assert_same(_stored("soccer.csv"), summary_table(trials, soccer, SOCCER_CURVES))
-    assert (claims["power"] > 0.8).all()
-    assert "not testable" not in set(claims["verdict"])
+def test_published_measures_are_what_the_code_computes(recomputed: Recomputed) -> None:
+    """Row by row, figures/claims_trials.csv holds the measures that the code gives now."""
+    task, settings, results = recomputed
+    stored = read_table(FIGURES / "claims_trials.csv")
+    own = stored[(stored["task"] == task) & (stored["trial"] < TRIALS[task])]
+    assert_same(own, measure_trials(results, settings))
 
 
-def test_soccer_readings_change_one_choice_each(soccer: dict[Key, Setting]) -> None:
-    """Each reading differs from the default in what its name says, and in nothing else."""
-    setting = soccer["unified-incorrect", "printed"]
-    readings = soccer_readings(setting.demos, {**SOCCER, "incorrect": "all"})
-    base = readings.pop("default")[1]
-    assert base == setting
-    for name, (without, with_them) in readings.items():
-        assert without.params == with_them.params
-        id, _, value = name.partition("=")
-        changed = {
-            key: new
-            for key, new in with_them.params.values().items()
-            if new != base.params.values()[key]
-        }
-        if id.startswith("SOCCER"):
-            assert changed == {}
-            assert with_them.demos != base.demos
-        else:
-            (new,) = changed.values()
-            assert str(new) == value
-            assert with_them.demos == base.demos
+def test_published_tables_follow_from_published_trials(recomputed: Recomputed) -> None:
+    """Every column of the tables follows from trials.csv."""
+    task, settings, _ = recomputed
+    trials = read_table(FIGURES / "trials.csv")
+    main = trials[trials["trial"] < claims().judging.trials[task]]  # type: ignore[index]
+    name = TABLES[task]
+    assert_same(read_table(FIGURES / f"{name}.csv"), summary_table(main, settings, PUBLISHED[task]))
+    assert_same(read_table(FIGURES / f"{name}_contrasts.csv"), contrasts_table(main, settings))
+    if task != "soccer":
+        sets = set_settings(next(iter(settings.values())).demos, {})
+        few = trials[trials["trial"] < len(rows_of(trials, sets["opposite", "printed"]))]
+        stored = read_table(FIGURES / f"{task.replace('-', '_')}_sets.csv")
+        assert_same(stored, sets_table(few, sets))
+
+
+def test_verdicts_follow_from_published_measures() -> None:
+    """Every verdict, and every number beside it, follows from claims_trials.csv."""
+    judged = judge_claims(read_table(FIGURES / "claims_trials.csv"), claims())
+    assert_same(read_table(FIGURES / "claims.csv"), judged)
+    text = (FIGURES / "claims.md").read_text(encoding="utf-8")
+    assert text == markdown(readable_verdicts(judged))
+
+
+def test_verdicts_are_by_the_frozen_criteria() -> None:
+    """The hash of the frozen file stands beside every verdict."""
+    assert set(read_table(FIGURES / "claims.csv")["criteria"]) == {criteria_hash()}
+
+
+def test_claims_tables_and_figures_agree() -> None:
+    """An effect is the same number in the claims, in the tables of its task and in the figure."""
+    judged = read_table(FIGURES / "claims.csv")
+    drawn = read_table(FIGURES / "claims_figure.csv")
+    assert_same(drawn, judged[judged["direction"] != "inside"])
+    columns = {"mean-difference": "difference", "sd-ratio": "sd_ratio"}
+    compared = 0
+    for row in judged.itertuples():
+        if row.measure == "iterations" and row.statistic in columns:
+            table = read_table(FIGURES / f"{TABLES[row.task]}_contrasts.csv")
+            own = table[(table["x"] == row.x) & (table["y"] == row.y) & (table["F"] == row.F)]
+            assert own[columns[row.statistic]].item() == pytest.approx(row.effect, rel=1e-8)
+            compared += 1
+    assert compared == 10
+
+
+def test_published_comparisons_have_power() -> None:
+    """An effect as large as the paper's would be found in four cases of five."""
+    judged = read_table(FIGURES / "claims.csv")
+    compared = judged[(judged["statistic"] == "mean-difference") & judged["paper"].notna()]
+    assert len(compared) == 8
+    assert (compared["power"] > 0.8).all()
+
+
+def test_every_published_trial_reaches_zero() -> None:
+    """Figs. 5, 9 and 12: the error of every trial of the defaults falls to zero."""
+    assert (read_table(FIGURES / "claims_trials.csv")["converged"] == 1).all()
+
+
+def test_notebooks_judge_by_the_declared_seed() -> None:
+    """The paper profile of every notebook but the calibration runs from the judging root seed."""
+    from replication.notebooks import read_notebook
+
+    for path in sorted((PROJECT / "notebooks").glob("*.ipynb")):
+        seed = read_notebook(path).literals["seed"]
+        assert (seed == ROOT) == (path.stem != "calibration"), path.stem
+
+
+@pytest.mark.parametrize("name", ["default", "Q-START=reset", "MAP=random-1"])
+def test_published_sensitivity_is_what_the_code_computes(name: str, tmp_path: Path) -> None:
+    """A specification computed from nothing gives the stored effects and intervals."""
+    plan = declared()
+    one = next(s for s in single_specifications(plan.mazes.single.choices) if s.name == name)
+    settings = {one: maze_settings(one, plan.iteration_cap)}
+    results = run_trials(
+        list(settings[one].values()),
+        trials=plan.mazes.single.trials,
+        store=Store(tmp_path / "s"),
+        jobs=JOBS,
+        seed=plan.root_seed,
+    )
+    ours = effects_table(results, settings, [claims().by_id(id) for id in plan.mazes.claims])
+    stored = read_table(FIGURES / "sensitivity_single.csv")
+    assert_same(stored[stored["specification"] == name], ours)
 
 
 def test_both_readings_stand_side_by_side(small_demos: Demos) -> None:

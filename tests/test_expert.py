@@ -1,15 +1,17 @@
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
+from collections import Counter, deque
+from collections.abc import Iterator, Set
 from itertools import groupby, pairwise
 
+import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from replication import Demos, Maze, MazeError, demonstrate, load_demos
-from replication.expert import OPPOSITE, correct_actions
+from replication.expert import OPPOSITE, _way, correct_actions, random_actions
 from replication.paper import MOVES
 from replication.params import Expert
 from replication.paths import PROJECT
@@ -61,6 +63,26 @@ def all_ways(maze: Maze, state: int, left: int) -> Iterator[list[int]]:
         for action, there in enumerate(maze.next_state[state].tolist()):
             for rest in all_ways(maze, there, left - 1):
                 yield [action, *rest]
+
+
+def ways_around(maze: Maze, source: int, avoid: Set[int]) -> dict[int, list[list[int]]]:
+    """Enumerate the shortest ways from a state to each other that keep off `avoid`."""
+    found: dict[int, list[list[int]]] = {}
+    layer: dict[int, list[list[int]]] = {source: [[]]}
+    while layer:
+        found |= layer
+        following: dict[int, list[list[int]]] = {}
+        for state, ways in layer.items():
+            for action, there in enumerate(maze.next_state[state].tolist()):
+                if there not in found and there not in avoid:
+                    following.setdefault(there, []).extend([*way, action] for way in ways)
+        layer = following
+    return found
+
+
+def turns(actions: list[int]) -> int:
+    """Count the turns of a way."""
+    return sum(a != b for a, b in pairwise(actions))
 
 
 def cost(actions: list[int], leg: int) -> int:
@@ -121,6 +143,63 @@ def test_long_mazes_do_not_exhaust_the_stack() -> None:
     assert correct_actions(Maze(("S" + "." * 998 + "G",)), leg=4) == [2] * 999
 
 
+@given(maze=mazes(), seed=st.integers(0, 2**32))
+@settings(max_examples=100, deadline=None)
+def test_random_paths_are_shortest(maze: Maze, seed: int) -> None:
+    """A random path reaches the goal in the fewest moves, and the same seed gives the same one."""
+    actions, again = (random_actions(maze, seed=np.random.SeedSequence(seed)) for _ in range(2))
+    assert len(actions) == shortest(maze.rows)
+    assert maze.goal_step(actions) == len(actions)
+    assert actions == again
+
+
+@pytest.mark.parametrize(
+    "rows", [("..G", "...", "S.."), ("...G", "...#", "....", "S..."), ("G.#.", "....", ".S..")]
+)
+def test_random_paths_are_equally_likely(rows: tuple[str, ...]) -> None:
+    """Every shortest path occurs, as often as the others: chi-square at the level 0.001."""
+    maze = Maze(rows)
+    ways = {tuple(way) for way in all_ways(maze, maze.start, shortest(rows))}
+    each = 200
+    seeds = np.random.SeedSequence(1).spawn(each * len(ways))
+    counts = Counter(tuple(random_actions(maze, seed=seed)) for seed in seeds)
+    assert set(counts) == ways
+    statistic = sum((count - each) ** 2 / each for count in counts.values())
+    assert chi2.sf(statistic, len(ways) - 1) > 0.001
+
+
+def test_too_many_paths_to_number_are_refused() -> None:
+    """Beyond 2**63 shortest paths none is drawn, rather than some never."""
+    size = 40
+    rows = ("." * (size - 1) + "G", *["." * size] * (size - 2), "S" + "." * (size - 1))
+    with pytest.raises(ValueError, match="high"):
+        random_actions(Maze(rows), seed=np.random.SeedSequence(1))
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_demonstrations_along_a_random_path(stored_demos: Demos, number: int) -> None:
+    """DEMO-PATH random-n: the correct demonstration is the path of seed n, the rules go on."""
+    demos = demonstrate("t", stored_demos.maze, params=Expert(path=f"random-{number}"))
+    due = random_actions(stored_demos.maze, seed=np.random.SeedSequence(number))
+    assert demos.correct[0].actions.tolist() == due
+    assert len(due) == MOVES[stored_demos.task]
+    check_kinds(demos)
+
+
+@given(maze=mazes(6), data=st.data())
+@settings(max_examples=150, deadline=None)
+def test_ways_are_shortest_with_the_fewest_turns(maze: Maze, data: st.DataObject) -> None:
+    """Of all shortest ways around what is avoided it is the one with the fewest turns."""
+    source = data.draw(st.integers(0, maze.n_states - 1))
+    avoid = data.draw(st.frozensets(st.integers(0, maze.n_states - 1), max_size=8)) - {source}
+    due = {
+        state: min(ways, key=lambda way: (turns(way), way))
+        for state, ways in ways_around(maze, source, avoid).items()
+    }
+    for target in range(maze.n_states):
+        assert _way(maze, source, target, set(avoid)) == due.get(target)
+
+
 def test_hits_miss_each_corner() -> None:
     """In a map solved by hand: straight on at each of two corners, until a move changes nothing."""
     demos = demonstrate("t", Maze(("..#G", ".##.", "S...")), params=Expert(leg=4))
@@ -133,7 +212,7 @@ def test_hits_miss_each_corner() -> None:
 def test_near_detour_passes_the_cell_outside_the_corner() -> None:
     """In a map solved by hand, the way leaves mid-leg, rounds the corner and joins mid-leg."""
     maze = Maze((".......", ".....G.", ".......", ".......", ".S....."))
-    demos = demonstrate("t", maze)
+    demos = demonstrate("t", maze, params=Expert(leg=4))
     assert demos.correct[0].actions.tolist() == [0, 0, 0, 2, 2, 2, 2]
     (near,) = demos.select("near-detour").incorrect
     assert near.actions.tolist() == [0, 3, 0, 0, 0, 2, 2, 2, 1, 2, 2]
@@ -143,19 +222,18 @@ def test_near_detour_passes_the_cell_outside_the_corner() -> None:
 def test_a_detour_is_narrower_where_it_has_to_be() -> None:
     """Wide detours keep to the map; where not even one cell fits, there is none."""
     rows = ("........", "......G.", "........", "........", "..S.....", "........")
-    demos = demonstrate("t", Maze(rows), params=Expert(detour_width=8))
+    demos = demonstrate("t", Maze(rows), params=Expert(leg=4, detour_width=8))
     (near,), (wide,) = (demos.select(kind).incorrect for kind in ("near-detour", "detour"))
     assert wide.actions.tolist() == near.actions.tolist()
-    edge = demonstrate("t", Maze(("...G", "....", "S...")))
+    edge = demonstrate("t", Maze(("...G", "....", "S...")), params=Expert(leg=4))
     assert not set(DETOURS) & set(edge.kinds)
 
 
-@given(maze=mazes())
-@settings(max_examples=100, deadline=None)
-def test_demonstrations_of_any_maze(maze: Maze) -> None:
+@given(maze=mazes(), leg=st.sampled_from(LEGS), path=st.sampled_from(["legs", "random-1"]))
+@settings(max_examples=150, deadline=None)
+def test_demonstrations_of_any_maze(maze: Maze, leg: int, path: str) -> None:
     """Each kind keeps its rule in any maze; `Demos` itself checks that all moves are possible."""
-    demos = demonstrate("t", maze)
-    check_kinds(demos)
+    check_kinds(demonstrate("t", maze, params=Expert(leg=leg, path=path)))
 
 
 def test_demonstrations_of_the_stored_mazes(stored_demos: Demos) -> None:

@@ -35,6 +35,9 @@ def test_fit_is_trial_0_of_the_same_root(fitted: Fit, small_demos: Demos, store_
     trial = run_trials([setting], trials=1, store=Store(store_path), seed=3).trial(setting, 0)
     np.testing.assert_array_equal(fitted.weights, trial.weights)
     np.testing.assert_array_equal(fitted.q, trial.q)
+    np.testing.assert_array_equal(fitted.errors, trial.errors)
+    np.testing.assert_array_equal(fitted.states, trial.episodes[-1].states)
+    np.testing.assert_array_equal(fitted.actions, trial.episodes[-1].actions)
 
 
 def test_saved_fit_loads_with_every_bit(fitted: Fit, tmp_path: Path) -> None:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from replication import Demos
 from replication.expectations import feature_expectations
 from replication.irl import Trial, get_method, iterate, run
 from replication.params import Params
+from replication.setting import Setting
+from replication.tasks import Episode
 
 Array = NDArray[np.float64]
 GAMMA = 0.9
@@ -36,15 +39,14 @@ class Corridor:
             value[:, 4] = 0.0
         return q, streams + np.uint64(1), np.full(len(q), 7)
 
-    def roll_out(
-        self, q: Array, stream: NDArray[np.uint64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
+    def roll_out(self, q: Array, stream: NDArray[np.uint64]) -> tuple[Episode, NDArray[np.uint64]]:
         """Follow the greedy policy for at most 30 steps."""
         states, actions = [0], list[int]()
         while states[-1] != 4 and len(actions) < 30:
             actions.append(int(np.argmax(q[states[-1], ::-1]) == 0))  # ties go left
             states.append(int(NEXT[states[-1], actions[-1]]))
-        return np.array(states), np.array(actions), stream
+        visited = np.array(states)
+        return Episode(visited, np.array(actions), visited[1:] == visited[:-1]), stream
 
 
 def _mu_e() -> Array:
@@ -74,7 +76,7 @@ def test_every_method_learns_the_right_ordering(method: str) -> None:
     trial = _trial(method)
     assert trial.converged
     assert trial.errors[-1] == 0
-    np.testing.assert_array_equal(trial.states, EXPERT[0])
+    np.testing.assert_array_equal(trial.episodes[-1].states, EXPERT[0])
     assert (trial.q[:4, 0] > trial.q[:4, 1]).all()
 
 
@@ -83,6 +85,31 @@ def test_iterations_count_weight_updates() -> None:
     trial = _trial()
     assert trial.iterations == len(trial.errors) - 1 > 0
     assert trial.steps == 7 * trial.iterations
+
+
+@pytest.mark.parametrize("method", ["unified", "unified-incorrect", "adaboost"])
+@pytest.mark.parametrize("cap", [1, 500])
+def test_errors_follow_from_the_episodes(method: str, cap: int) -> None:
+    """Eq. 6: there are iterations + 1 episodes, and d of each has the bits of its error."""
+    trial = _trial(method, max_iterations=cap)
+    assert len(trial.episodes) == len(trial.errors) == trial.iterations + 1
+    for (states, actions, _), error in zip(trial.episodes, trial.errors, strict=True):
+        mu_i = feature_expectations(states, actions, gamma=GAMMA, shape=(5, 2))
+        assert np.linalg.norm(_mu_e() - mu_i) == error
+
+
+def test_values_are_those_of_q_on_the_experts_path(small_demos: Demos) -> None:
+    """Row i of the values is max_a Q after i updates where the expert acts, by state, rounded."""
+    setting = Setting(small_demos, "unified", Params.of(episodes=60, horizon=40, max_iterations=9))
+    loop = setting.trial(seed=np.random.SeedSequence(1), keep=True)
+    ((_, trial),) = run(setting.task, [loop])
+    assert trial.snapshots is not None
+    path = sorted(small_demos.correct[0].states[:-1].tolist())
+    assert path != small_demos.correct[0].states[:-1].tolist()
+    due = trial.snapshots.q.max(axis=2)[:, path].astype(np.float32)
+    assert trial.values.dtype == np.float32
+    assert due[1:].any()
+    np.testing.assert_array_equal(trial.values, due)
 
 
 def test_first_error_is_that_of_the_first_trajectory() -> None:
@@ -114,22 +141,23 @@ def test_snapshots_begin_before_and_end_after_learning() -> None:
     assert not trial.snapshots.weights[0].any()
     np.testing.assert_array_equal(trial.snapshots.weights[-1], trial.weights)
     np.testing.assert_array_equal(trial.snapshots.q[-1], trial.q)
-    np.testing.assert_array_equal(trial.snapshots.states[-1], trial.states)
+    assert len(trial.snapshots.q) == len(trial.episodes)
+    assert plain.snapshots is None
+    np.testing.assert_array_equal(plain.values, trial.values)
     np.testing.assert_array_equal(plain.errors, trial.errors)
 
 
 def test_weights_are_the_sum_of_the_updates() -> None:
-    """Eq. 9 along a whole trial: the snapshots' weights follow from their trajectories."""
-    trial = _trial(keep=True)
+    """Eq. 9 along a whole trial: the snapshots' weights follow from the trajectories."""
+    trial = _trial(keep=True, f_start=0.5, alpha=0.3)
     assert trial.snapshots is not None
     f, w = np.full((5, 2), 0.5), np.zeros((5, 2))
     for i in range(trial.iterations):
-        mu_i = feature_expectations(
-            trial.snapshots.states[i], trial.snapshots.actions[i], gamma=GAMMA, shape=(5, 2)
-        )
+        states, actions, _ = trial.episodes[i]
+        mu_i = feature_expectations(states, actions, gamma=GAMMA, shape=(5, 2))
         residual = _mu_e() - mu_i
         w = w + f * residual
-        f = f + 0.5 * ((residual != 0) - f)
+        f = f + 0.3 * ((residual != 0) - f)
         np.testing.assert_array_equal(trial.snapshots.weights[i + 1], w)
 
 
@@ -196,8 +224,8 @@ def test_trials_side_by_side_learn_in_one_call() -> None:
 def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     """No error at the first trajectory means zero iterations and no learning."""
     task = Corridor()
-    states, actions, _ = task.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
-    mu = feature_expectations(states, actions, gamma=GAMMA, shape=(5, 2))
+    episode, _ = task.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
+    mu = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
     loop = iterate(
         task,
         get_method("unified"),

@@ -104,7 +104,7 @@ def test_unknown_name(name: str, near: str) -> None:
 
 def test_parameters_of_other_concerns_are_unknown() -> None:
     """What does not determine a trial is not among its parameters."""
-    for name in ("leg", "trials", "learner"):
+    for name in ("leg", "path", "trials", "early", "learner"):
         with pytest.raises(ChoiceError, match="unknown parameter"):
             Params.of(**{name: 4})
 

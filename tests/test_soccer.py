@@ -519,15 +519,16 @@ def test_goal_and_time_out_in_the_target() -> None:
 
 
 def test_roll_out_of_the_expert() -> None:
-    """The greedy policy of a Q that prefers the expert's actions repeats the expert's episode."""
+    """The greedy policy of a Q that prefers the expert's actions repeats its episode, hitless."""
     pairs, _, world = expert()
     q = np.zeros((384, 5))
     for state, action in pairs:
         q[state, action] = 1.0
     stream = qlearning.stream(np.random.SeedSequence(7))
-    states, actions, after = soccer_learning.roll_out(SoccerParams(), q, stream)
+    states, actions, hits, after = soccer_learning.roll_out(SoccerParams(), q, stream)
     assert list(zip(states[:-1].tolist(), actions.tolist(), strict=True)) == pairs
     assert states[-1] == world.state
+    assert hits.tolist() == [False] * len(pairs)
     words = stream.tolist()
     for _ in pairs:
         reference.draw(words)

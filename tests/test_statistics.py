@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import astuple, replace
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -8,25 +8,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from replication import statistics
 from replication.statistics import (
-    NOT_REPRODUCED,
-    NOT_TESTABLE,
-    REPRODUCED,
-    REVERSED,
-    UNDECIDED,
-    Comparison,
+    FEWEST,
+    RESAMPLES_OF_MANY,
     compare,
     holm,
     mean_interval,
+    mean_intervals,
+    mean_prediction,
     power,
-    prediction_interval,
+    sd_interval,
+    sd_prediction,
+    sd_ratio_intervals,
+    share_interval,
+    standard_errors,
     summarise,
-    verdict_fewer,
-    verdict_steadier,
 )
 
 COUNTS = st.lists(st.integers(0, 300), min_size=2, max_size=12)
-NEUTRAL = Comparison(0.0, -1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 0.8, 1.2, 1.0, 0.5, n=100)
 NAN = float("nan")
 
 
@@ -84,8 +84,6 @@ def test_a_sample_does_not_differ_from_itself(x: list[int]) -> None:
     found = compare(x, x, published=-4.8)
     assert (found.difference, found.low, found.high, found.fewer) == (0.0, 0.0, 0.0, 0.5)
     assert (found.p_welch, found.p_wilcoxon) == (1.0, 1.0)
-    assert verdict_fewer(replace(found, n=100), found.p_wilcoxon) == NOT_REPRODUCED
-    assert verdict_steadier(found, found.p_spread) == NOT_TESTABLE
 
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(0, 300)), min_size=2, max_size=12))
@@ -108,16 +106,13 @@ def test_samples_that_do_not_spread() -> None:
     assert np.isnan([found.sd_ratio, found.sd_low, found.sd_high, found.p_spread]).all()
     assert np.isnan(found.power)
     assert found.p_welch == 0.0
-    assert verdict_steadier(found, found.p_spread) == NOT_TESTABLE
 
 
 def test_capped_comparison_is_not_testable() -> None:
-    """With a trial at the cap every statistic is NaN, and so is each verdict not testable."""
+    """With a trial at the cap every statistic is NaN; the trials are counted."""
     found = compare([1, 2, 300], [4, 5, 6], capped=True, published=-4.8)
     assert np.isnan(astuple(found)[:-1]).all()
     assert found.n == 3
-    for verdict in (verdict_fewer, verdict_steadier):
-        assert verdict(replace(found, n=100), 0.001) == NOT_TESTABLE
 
 
 # --- intervals -------------------------------------------------------------------------------
@@ -150,7 +145,7 @@ def test_interval_leans_to_the_longer_tail() -> None:
 
 
 @pytest.mark.parametrize(("n", "m"), [(5, 100), (100, 100), (30, 5)])
-def test_prediction_interval_by_simulation(n: int, m: int) -> None:
+def test_mean_prediction_by_simulation(n: int, m: int) -> None:
     """The mean of m new trials lies in the interval in 95 of 100 replications."""
     rng = np.random.default_rng(7)
     first = rng.normal(40.0, 8.0, (10_000, n))
@@ -159,7 +154,7 @@ def test_prediction_interval_by_simulation(n: int, m: int) -> None:
         low <= new <= high
         for (low, high), new in zip(
             (
-                prediction_interval(mean, sd, n, m)
+                mean_prediction(mean, sd, n, m)
                 for mean, sd in zip(first.mean(1), first.std(1, ddof=1), strict=True)
             ),
             means,
@@ -169,10 +164,148 @@ def test_prediction_interval_by_simulation(n: int, m: int) -> None:
     assert np.mean(inside) == pytest.approx(0.95, abs=0.009)  # four standard errors
 
 
-def test_prediction_interval_of_the_paper() -> None:
+def test_mean_prediction_of_the_paper() -> None:
     """For Table I's 36.48 (3.58), 100 against 100: 36.48 -+ 1.9842 x 3.58 x sqrt(2 / 100)."""
-    low, high = prediction_interval(36.48, 3.58, 100, 100)
+    low, high = mean_prediction(36.48, 3.58, 100, 100)
     assert (low, high) == pytest.approx((36.48 - 1.00458, 36.48 + 1.00458), abs=1e-4)
+
+
+# --- predictions and intervals of SDs and shares ---------------------------------------------
+
+DRAWS = {
+    "normal": lambda rng, shape: rng.normal(40.0, 5.0, shape),
+    "uniform": lambda rng, shape: rng.uniform(0.0, 1.0, shape),
+    "counts": lambda rng, shape: rng.poisson(6.0, shape).astype(float),
+}
+
+
+@pytest.mark.parametrize("shape", list(DRAWS))
+def test_sd_interval_covers(shape: str) -> None:
+    """The interval of an SD holds the true one in about 95 of 100 samples, normal or not."""
+    sd = {"normal": 5.0, "uniform": 12**-0.5, "counts": 6**0.5}[shape]
+    samples = DRAWS[shape](np.random.default_rng(1), (800, 100))
+    bounds = np.array([sd_interval(sample) for sample in samples])
+    inside = (bounds[:, 0] <= sd) & (sd <= bounds[:, 1])
+    assert inside.mean() == pytest.approx(0.95, abs=0.025)
+
+
+@pytest.mark.parametrize(("shape", "n", "m"), [("normal", 100, 60), ("uniform", 60, 100)])
+def test_sd_prediction_covers(shape: str, n: int, m: int) -> None:
+    """The SD of a sample like the published one lies within in 92 to 98 of 100 replications."""
+    rng = np.random.default_rng(2)
+    published = DRAWS[shape](rng, (800, n)).std(axis=1, ddof=1)
+    ours = DRAWS[shape](rng, (800, m))
+    inside = [
+        low <= own.std(ddof=1) <= high
+        for sd, own in zip(published, ours, strict=True)
+        for low, high in [sd_prediction(sd, n, own)]
+    ]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.035)
+
+
+def test_sd_prediction_by_hand() -> None:
+    """For a sample of two equal halves (kurtosis 1) the SD is certain; scale does not matter."""
+    halves = np.array([0.0, 1.0] * 20)
+    assert sd_prediction(4.73, 100, halves) == pytest.approx((4.73, 4.73))
+    sample = np.array([0.0, 1.0, 2.0, 3.0])  # kurtosis 1.64, so that the variance is .64 / 16
+    half = 1.959964 * (0.04 * (1 + 4 / 100)) ** 0.5
+    due = 4.73 * np.exp(-half), 4.73 * np.exp(half)
+    assert sd_prediction(4.73, 100, sample) == pytest.approx(due)
+    assert sd_prediction(4.73, 100, 40 + 3 * sample) == pytest.approx(due)
+    low, high = sd_interval(sample)
+    assert low * high == pytest.approx(sample.var(ddof=1))
+    assert np.log(high / low) == pytest.approx(2 * 1.959964 * 0.2)
+
+
+def test_constant_sample_has_no_interval_of_an_sd() -> None:
+    """Where nothing varies there is no kurtosis, and no prediction."""
+    assert np.isnan([sd_interval(np.ones(40)), sd_prediction(5.0, 100, np.ones(40))]).all()
+
+
+@pytest.mark.parametrize(
+    ("k", "n", "low", "high"),
+    [(0, 10, 0.0, 0.3085), (10, 10, 0.6915, 1.0), (5, 10, 0.1871, 0.8129), (1, 20, 0.0013, 0.2487)],
+)
+def test_share_interval_by_a_table(k: int, n: int, low: float, high: float) -> None:
+    """Clopper and Pearson's intervals as they are printed in tables."""
+    assert share_interval(k, n) == pytest.approx((low, high), abs=5e-5)
+
+
+@given(st.integers(1, 60), st.data())
+@settings(deadline=None, max_examples=30)
+def test_share_interval_inverts_the_binomial_test(n: int, data: st.DataObject) -> None:
+    """At its bounds each tail has 2.5 %; shares and their complements mirror each other."""
+    k = data.draw(st.integers(0, n))
+    low, high = share_interval(k, n)
+    assert low <= k / n <= high
+    if k > 0:
+        assert stats.binom.sf(k - 1, n, low) == pytest.approx(0.025)
+    if k < n:
+        assert stats.binom.cdf(k, n, high) == pytest.approx(0.025)
+    assert share_interval(n - k, n) == pytest.approx((1 - high, 1 - low))
+
+
+# --- many intervals at once ------------------------------------------------------------------
+
+
+@pytest.fixture
+def resamples_of_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give single intervals as few resamples as those of many rows have."""
+    monkeypatch.setattr(statistics, "RESAMPLES", RESAMPLES_OF_MANY)
+
+
+@pytest.mark.usefixtures("resamples_of_many")
+def test_intervals_of_many_means_are_those_of_each() -> None:
+    """Row by row they are the BCa intervals of single samples, with the same resamples."""
+    rng = np.random.default_rng(3)
+    samples = np.array([rng.normal(0, 1, 12), rng.exponential(5, 12), rng.integers(0, 4, 12)])
+    low, high = mean_intervals(samples)
+    for row, bounds in zip(samples, zip(low, high, strict=True), strict=True):
+        assert bounds == pytest.approx(mean_interval(row), rel=1e-9, abs=1e-9)
+    alone = mean_intervals(samples[1:2])
+    assert (alone[0][0], alone[1][0]) == pytest.approx((low[1], high[1]))
+
+
+@pytest.mark.usefixtures("resamples_of_many")
+def test_intervals_of_many_ratios_are_those_of_each() -> None:
+    """Likewise for ratios of SDs, the pairs resampled together."""
+    x, y = np.random.default_rng(5).normal(40, [[[3]], [[8]]], (2, 4, FEWEST))
+    ratio, low, high = sd_ratio_intervals(x, y)
+    for at in range(4):
+        one = compare(x[at], y[at])
+        due = one.sd_ratio, one.sd_low, one.sd_high
+        assert (ratio[at], low[at], high[at]) == pytest.approx(due, rel=1e-9)
+
+
+@pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.1, 40.0, 1 / 3]])
+def test_constant_rows_are_their_own_intervals(values: list[float]) -> None:
+    """A row that does not vary has its value as both bounds, whatever the other rows do."""
+    flat = np.repeat(np.array(values)[:, None], 10, axis=1)
+    noise = np.random.default_rng(6).normal(size=(1, 10))
+    low, high = mean_intervals(np.concatenate([flat, noise]))
+    assert low[:3] == pytest.approx(values)
+    assert (low[:3] == high[:3]).all()
+    assert low[3] < noise.mean() < high[3]
+
+
+def test_ratio_to_a_constant_is_missing() -> None:
+    """Where y does not vary there is no ratio and no interval; the other rows keep theirs."""
+    rng = np.random.default_rng(7)
+    x, y = rng.normal(size=(2, 3, 12))
+    y[1] = 4.0
+    found = np.array(sd_ratio_intervals(x, y))
+    assert np.isnan(found[:, 1]).all()
+    assert np.isnan(np.array(sd_ratio_intervals(y, x))[:, 1]).all()
+    assert np.isfinite(found[:, [0, 2]]).all()
+    assert (found[1] <= found[0])[[0, 2]].all()
+    assert (found[0] <= found[2])[[0, 2]].all()
+
+
+def test_standard_errors_are_those_of_normal_intervals() -> None:
+    """An interval of an estimate with standard error s is 2 x 1.96 s wide."""
+    s = np.array([0.5, 2.0])
+    found = standard_errors(3.0 - stats.norm.ppf(0.975) * s, 3.0 + stats.norm.ppf(0.975) * s)
+    assert found == pytest.approx(s)
 
 
 # --- power -----------------------------------------------------------------------------------
@@ -208,36 +341,16 @@ def test_power_needs_an_effect_and_a_spread() -> None:
     assert np.isnan(power(0.0, 2, 1.0))
 
 
-# --- verdicts --------------------------------------------------------------------------------
+# --- ratios of SDs ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "p", "due"),
-    [
-        (-2.0, -1e-9, 0.0499, REPRODUCED),
-        (-2.0, -1e-9, 0.0501, UNDECIDED),
-        (-2.0, 0.0, 0.0499, UNDECIDED),
-        (-2.0, 0.0, 0.0501, NOT_REPRODUCED),
-        (0.0, 0.0, 1.0, NOT_REPRODUCED),
-        (1e-9, 2.0, 0.0499, REVERSED),
-        (1e-9, 2.0, 0.0501, UNDECIDED),
-        (NAN, NAN, 0.001, NOT_TESTABLE),
-        (-2.0, -1.0, NAN, NOT_TESTABLE),
-    ],
-)
-def test_verdict_needs_both_locks(low: float, high: float, p: float, due: str) -> None:
-    """The whole interval lies on one side and the test rejects; else it is undecided."""
-    assert verdict_fewer(replace(NEUTRAL, low=low, high=high), p) == due
-    ratio = replace(NEUTRAL, sd_low=1 + low / 10, sd_high=1 + high / 10)
-    assert verdict_steadier(ratio, p) == due
-
-
-def test_few_trials_get_no_verdict() -> None:
-    """Below 30 trials nothing is judged, however clear it looks."""
-    clear = replace(NEUTRAL, low=-3.0, high=-2.0, sd_low=0.1, sd_high=0.2)
-    assert verdict_fewer(replace(clear, n=30), 0.001) == REPRODUCED
-    assert verdict_fewer(replace(clear, n=29), 0.001) == NOT_TESTABLE
-    assert verdict_steadier(replace(clear, n=29), 0.001) == NOT_TESTABLE
+def test_few_trials_give_no_interval_of_a_ratio() -> None:
+    """Below 30 trials the ratio of SDs stands without an interval."""
+    sample = np.random.default_rng(4).normal(40.0, 5.0, (2, FEWEST))
+    assert np.isfinite(compare(*sample).sd_low)
+    few = compare(*sample[:, 1:])
+    assert np.isnan([few.sd_low, few.sd_high]).all()
+    assert np.isfinite(few.sd_ratio)
 
 
 def test_ratio_of_sds_has_an_interval_that_knows_the_pairs() -> None:

@@ -7,22 +7,31 @@ import pandas as pd
 import pytest
 
 from replication import Demos, Maze, demonstrate
-from replication.comparisons import F_INDICES, TABLE_1_CLAIMS, Key, method_settings, set_settings
+from replication.comparisons import F_INDICES, Key, method_settings, set_settings
 from replication.paper import TABLE_1
 from replication.setting import Setting
+from replication.statistics import compare, holm
 from replication.tables import (
-    claims_table,
-    findings,
+    PAIRS,
+    contrasts_table,
     markdown,
     pairs_near,
-    readable_claims,
+    read_table,
+    readable_ablations,
+    readable_contrasts,
+    readable_levels,
+    readable_outcomes,
     readable_sets,
     readable_summary,
+    readable_verdicts,
     rows_of,
     sets_table,
     summary_table,
+    verdict_lines,
+    write_csv,
     write_trials,
 )
+from replication.verdicts import overall
 
 MEANS = {"adaboost": 45, "unified": 40, "unified-incorrect": 36}
 
@@ -72,42 +81,43 @@ def test_summary_is_that_of_the_trials(settings: dict[Key, Setting]) -> None:
 
 
 def test_capped_trials_are_counted_and_never_averaged(settings: dict[Key, Setting]) -> None:
-    """One trial at the cap withholds the mean and makes its comparisons not testable."""
+    """One trial at the cap withholds the mean and leaves its contrasts without numbers."""
     trials = _trials(settings, capped="updated")
     table = summary_table(trials, settings, TABLE_1).set_index("F")
     assert (table.loc["updated", "capped"] == 1).all()
     assert table.loc["updated", "mean"].isna().all()
     assert table.loc["printed", "mean"].notna().all()
-    claims = claims_table(trials, settings, TABLE_1_CLAIMS, TABLE_1).set_index("F")
-    assert set(claims.loc["updated", "verdict"]) == {"not testable"}
-    assert "not testable" not in set(claims.loc["printed", "verdict"])
+    contrasts = contrasts_table(trials, settings).set_index("F")
+    numbers = contrasts.columns.drop(["x", "y", "n"])
+    assert contrasts.loc["updated", numbers].isna().all(axis=None)
+    assert contrasts.loc["printed", numbers].notna().all(axis=None)
+    assert set(contrasts["n"]) == {40}
 
 
-def test_made_up_trials_that_follow_the_paper_reproduce_it(settings: dict[Key, Setting]) -> None:
-    """Trials drawn with the paper's ordering get "reproduced" for every claim."""
-    claims = claims_table(_trials(settings), settings, TABLE_1_CLAIMS, TABLE_1)
-    assert len(claims) == len(TABLE_1_CLAIMS) * len(F_INDICES)
-    assert set(claims["verdict"]) == {"reproduced"}
-
-
-def test_made_up_trials_of_one_method_reproduce_nothing(settings: dict[Key, Setting]) -> None:
-    """If all methods need the same iterations, no claim holds."""
-    trials = _trials(settings)
-    trials["iterations"] = 40 + trials["trial"] % 5
-    claims = claims_table(trials, settings, TABLE_1_CLAIMS, TABLE_1)
-    assert set(claims["verdict"]) == {"not reproduced"}
-
-
-def test_claims_pair_the_readings(settings: dict[Key, Setting]) -> None:
-    """Each row compares settings of one reading; AdaBoost stands in both."""
+def test_contrasts_are_paired_comparisons(settings: dict[Key, Setting]) -> None:
+    """Each row compares two settings of one reading trial by trial; AdaBoost stands in both."""
     trials = _trials(settings)
     trials.loc[trials["choices"] == "F-INDEX=updated", "iterations"] += 100
-    claims = claims_table(trials, settings, TABLE_1_CLAIMS, TABLE_1)
-    fewer = claims[claims["judged"] == "fewer"]
-    against = fewer[fewer["claim"].str.contains("AdaBoost")].set_index("F")["difference"]
+    table = contrasts_table(trials.sample(frac=1.0, random_state=1), settings)
+    keys = list(table[["x", "y", "F"]].itertuples(index=False, name=None))
+    assert keys == [(x, y, f) for x, y in PAIRS for f in F_INDICES]
+    for row in table.to_dict("records"):
+        one = settings[row["x"], row["F"]]
+        other = settings.get((row["y"], row["F"]), settings.get((row["y"], "")))
+        assert other is not None
+        x, y = (rows_of(trials, each)["iterations"] for each in (one, other))
+        found = compare(x, y)
+        for name in ("difference", "low", "high", "fewer", "sd_ratio", "p_wilcoxon", "p_spread"):
+            assert row[name] == getattr(found, name)
+    against = table[table["y"] == "adaboost"].set_index("F")["difference"]
     assert against["updated"] - against["printed"] == pytest.approx(100, abs=3)
-    among = fewer[~fewer["claim"].str.contains("AdaBoost")].set_index("F")["difference"]
-    assert among["updated"] == pytest.approx(among["printed"], abs=3)
+
+
+def test_contrasts_without_a_method_are_left_out(settings: dict[Key, Setting]) -> None:
+    """In robot soccer, where AdaBoost-IRL is not run, there is nothing to compare it with."""
+    fewer = {key: one for key, one in settings.items() if key[0] != "adaboost"}
+    table = contrasts_table(_trials(settings), fewer)
+    assert table["x"].tolist() == ["unified-incorrect"] * 2
 
 
 def test_pairs_near_by_hand() -> None:
@@ -144,27 +154,213 @@ def test_sets_compare_with_no_incorrect_demonstrations(small_demos: Demos) -> No
     empty = table[table["set"] == "none"].set_index("F")["mean"]
     for row in table.itertuples():
         assert row.difference == pytest.approx(row.mean - empty[row.F])
-    assert (table[table["set"] == "none"]["verdict"] == "").all()
+    tested = table["set"] != "none"
+    assert table[~tested][["p", "p_holm"]].isna().all(axis=None)
+    assert table[tested]["p_holm"].tolist() == holm(table[tested]["p"].tolist()).tolist()
 
 
 def test_readable_tables_have_a_row_for_each_row(
     settings: dict[Key, Setting], small_demos: Demos
 ) -> None:
-    """What is printed for readers has as many rows, no NaN, and the same verdicts."""
+    """What is printed for readers has as many rows and no NaN."""
     trials = _trials(settings, capped="updated")
     summary = summary_table(trials, settings, {"unified": TABLE_1["unified"]})
-    claims = claims_table(trials, settings, TABLE_1_CLAIMS, {})
+    contrasts = contrasts_table(trials, settings)
     sets = set_settings(small_demos, {})
     saved = sets_table(_trials(sets).drop_duplicates(["method", "choices", "trial"]), sets)
     for table, readable in (
         (summary, readable_summary(summary)),
-        (claims, readable_claims(claims)),
+        (contrasts, readable_contrasts(contrasts)),
     ):
         assert len(readable) == len(table)
         assert "nan" not in markdown(readable).lower()
-    assert readable_claims(claims)["Verdict"].tolist() == claims["verdict"].tolist()
     assert len(readable_sets(saved)) == len(saved) / 2
-    assert findings(claims).count("\n") == len(claims)
+
+
+def test_readable_contrasts_by_hand(settings: dict[Key, Setting]) -> None:
+    """Methods have their labels, numbers their intervals, and small p-values no false digits."""
+    table = contrasts_table(_trials(settings), settings).head(1)
+    names = ["difference", "low", "high", "sd_ratio", "sd_low", "sd_high", "fewer"]
+    table[names] = [-4.0, -6.5, -1.255, 0.5, 0.25, 0.751, 0.8]
+    table[["p_wilcoxon", "p_spread"]] = [0.00099, 0.04]
+    assert readable_contrasts(table).iloc[0].tolist() == [
+        "Unified, without incorrect against AdaBoost-IRL (R1)",
+        "Fᵢ (printed)",
+        "-4.00 [-6.50, -1.25]",
+        "0.50 [0.25, 0.75]",
+        "0.80",
+        "< 0.001",
+        "0.040",
+    ]
+
+
+# --- judged claims ---------------------------------------------------------------------------
+
+JUDGED = pd.DataFrame(
+    [
+        ("A", "It is faster", "mean-difference", "printed", -4.0, -5.0, -3.0, -4.84, "reproduced"),
+        ("A", "It is faster", "mean-difference", "updated", -3.0, -4.0, -2.0, -4.84, "reproduced"),
+        ("B", "It is steadier", "sd-ratio", "printed", 0.5, 0.4, 0.6, 0.46, "reproduced"),
+        ("B", "It is steadier", "sd-ratio", "updated", 0.9, 0.8, 1.1, 0.46, "undecided"),
+        ("C", "Q grows", "mean", "printed", 0.1, -0.1, 0.3, np.nan, "not reproduced"),
+        ("C", "Q grows", "mean", "updated", 0.2, -0.1, 0.5, np.nan, "not reproduced"),
+        ("D", "Mean", "published-mean", "", 44.0, 43.0, 45.0, 44.94, "not testable"),
+        ("E", "A run", "published-run", "printed", 41.0, 30.5, 55.0, 47.0, "not testable"),
+        ("E", "A run", "published-run", "updated", np.nan, np.nan, np.nan, 47.0, "not testable"),
+    ],
+    columns=["id", "claim", "statistic", "F", "effect", "low", "high", "paper", "verdict"],
+).assign(place="Fig. 6", why=["", "", "", "a", "", "", "it was used", "two capped", "all capped"])
+
+
+def test_readable_verdicts_by_hand() -> None:
+    """One row a claim: effects of both readings in their own unit, and the verdict of both."""
+    found = readable_verdicts(JUDGED)
+    assert found.columns.tolist() == [
+        "Claim",
+        "Place",
+        "Paper",
+        "Fᵢ (printed)",
+        "Fᵢ₊₁ (updated)",
+        "Verdict",
+    ]
+    assert found.drop(columns="Place").to_numpy().tolist() == [
+        [
+            "It is faster",
+            "-4.84",
+            "-4.00 [-5.00, -3.00]",
+            "-3.00 [-4.00, -2.00]",
+            "**reproduced**",
+        ],
+        [
+            "It is steadier",
+            "× 0.46",
+            "× 0.50 [0.40, 0.60]",
+            "× 0.90 [0.80, 1.10]",
+            "partly (Fᵢ reproduced, Fᵢ₊₁ undecided)",
+        ],
+        ["Q grows", "–", "0.10 [-0.10, 0.30]", "0.20 [-0.10, 0.50]", "not reproduced"],
+        ["Mean", "44.94", "44.00 [43.00, 45.00]", "–", "not testable: it was used"],
+        ["A run", "47.00", "median 41; 30 to 55", "–", "not testable: two capped"],
+    ]
+
+
+def test_verdict_lines_have_the_verdict_first() -> None:
+    """On a terminal there is a line a claim, in the order of the table."""
+    found = verdict_lines(JUDGED)
+    assert found[1] == "partly         It is steadier (Fig. 6)"
+    for line, (_, part) in zip(found, JUDGED.groupby("id"), strict=True):
+        assert line[:15].rstrip() == overall(part["verdict"].tolist())
+        assert line[15:] == f"{part['claim'].iloc[0]} (Fig. 6)"
+
+
+def test_verdicts_read_the_same_from_a_file(tmp_path: Path) -> None:
+    """What readers see of judged claims follows from the file alone."""
+    stored = read_table(write_csv(JUDGED, tmp_path / "claims.csv"))
+    pd.testing.assert_frame_equal(readable_verdicts(stored), readable_verdicts(JUDGED))
+    assert verdict_lines(stored) == verdict_lines(JUDGED)
+
+
+# --- specifications --------------------------------------------------------------------------
+
+
+def test_readable_outcomes_by_hand() -> None:
+    """Each claim and group has its counts and the range of its effects."""
+    table = pd.DataFrame(
+        {
+            "claim": ["FASTER", "FASTER"],
+            "group": ["single", "factorial"],
+            "specifications": [44, 240],
+            "holds": [40, 200],
+            "open": [3, 30],
+            "reversed": [1, 9],
+            "undefined": [0, 1],
+            "share": [0.9, 0.8],
+            "with_caps": [0, 7],
+            "median": [-4.0, -3.456],
+            "lowest": [-9.0, -20.0],
+            "highest": [1.0, 2.5],
+        }
+    )
+    assert readable_outcomes(table).to_numpy().tolist() == [
+        ["FASTER", "one at a time", 44, 40, 3, 1, 0, 0, "-4.00 (-9.00, 1.00)"],
+        ["FASTER", "all at once", 240, 200, 30, 9, 1, 7, "-3.46 (-20.00, 2.50)"],
+    ]
+
+
+def test_readable_levels_are_of_one_claim() -> None:
+    """The default value is marked, shares are in percent, a missing effect is a dash."""
+    table = pd.DataFrame(
+        {
+            "claim": ["FASTER", "FASTER", "STEADIER"],
+            "choice": "ALPHA",
+            "value": [0.1, 0.3, 0.3],
+            "default": [False, True, True],
+            "specifications": 60,
+            "mean_effect": [-4.0, np.nan, 1.0],
+            "holds": [0.8, 0.05, 1.0],
+            "reversed": [0.0, 0.111, 0.0],
+        }
+    )
+    assert readable_levels(table, "FASTER").to_numpy().tolist() == [
+        ["ALPHA", "0.1", "-4.00", "80%", "0%"],
+        ["ALPHA", "0.3 (default)", "–", "5%", "11%"],
+    ]
+
+
+def test_readable_ablations_by_hand() -> None:
+    """A row a setting: mean with its interval, SD, median and how many trials are at the cap."""
+    table = pd.DataFrame(
+        {
+            "setting": ["default"],
+            "n": [30],
+            "capped": [2],
+            "mean": [40.0],
+            "low": [38.0],
+            "high": [42.0],
+            "sd": [4.5],
+            "median": [39.5],
+        }
+    )
+    assert readable_ablations(table).iloc[0].tolist() == [
+        "default",
+        "40.00 [38.00, 42.00]",
+        "4.50",
+        "39.5",
+        "2 of 30",
+    ]
+
+
+# --- files -----------------------------------------------------------------------------------
+
+
+def test_tables_are_read_as_they_were_written(tmp_path: Path) -> None:
+    """Numbers, truth values and words come back; missing numbers are NaN, missing words empty."""
+    table = pd.DataFrame(
+        {
+            "F": ["", "printed"],
+            "why": ["", "nan"],
+            "n": [30, 100],
+            "effect": [1 / 3, np.nan],
+            "p": [np.nan, np.nan],
+            "default": [True, False],
+            "divergence": [0.5, np.inf],
+        }
+    )
+    path = write_csv(table, tmp_path / "table.csv")
+    found = read_table(path)
+    assert found.columns.tolist() == table.columns.tolist()
+    for name in ("F", "why", "n", "default"):
+        assert found[name].tolist() == table[name].tolist(), name
+    for name in ("effect", "p", "divergence"):
+        due = pytest.approx(table[name].tolist(), nan_ok=True, rel=1e-9)
+        assert found[name].tolist() == due, name
+    assert write_csv(found, tmp_path / "again.csv").read_bytes() == path.read_bytes()
+
+
+def test_column_f_is_text_even_if_it_is_empty(tmp_path: Path) -> None:
+    """A table of a method without a trace has an empty reading of Eq. 9, not a missing number."""
+    table = pd.DataFrame({"F": ["", ""], "n": [1, 2]})
+    assert read_table(write_csv(table, tmp_path / "table.csv"))["F"].tolist() == ["", ""]
 
 
 def test_markdown_is_a_table() -> None:

@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from replication import Demos, Params, load_demos
 from replication.choices import ChoiceError
+from replication.envs.field import SoccerField
+from replication.envs.soccer import SoccerParams, SoccerWorld
 from replication.paper import SOCCER
 from replication.paths import PROJECT
 from replication.qlearning import stream
@@ -30,6 +34,48 @@ def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
     """What the compiled maze learner cannot do is refused, not ignored."""
     with pytest.raises(ChoiceError, match=r"epsilon_end = 0\.3"):
         make_task(small_demos.environment, Params.of(epsilon=0.3))
+
+
+def test_hits_in_mazes_are_the_moves_that_change_nothing(stored_demos: Demos) -> None:
+    """A maze's episode moves by the table, and hits something just where it stays in place."""
+    maze = stored_demos.maze
+    task = make_task(maze, Params.of(horizon=60))
+    rng = np.random.default_rng(1)
+    seen: set[bool] = set()
+    for seed in range(20):
+        q = rng.integers(0, 3, size=task.shape).astype(float)
+        episode, _ = task.roll_out(q, stream(np.random.SeedSequence(seed)))
+        moves = zip(episode.states.tolist(), episode.actions.tolist(), strict=False)
+        there = [int(maze.next_state[state, action]) for state, action in moves]
+        assert episode.states[1:].tolist() == there
+        assert episode.hits.tolist() == [
+            a == b for a, b in zip(episode.states, there, strict=False)
+        ]
+        assert episode.hits.dtype == np.bool_
+        seen.update(episode.hits.tolist())
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize("macro", ["decision", "cell"])
+def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: str) -> None:
+    """Where the plain world, given an episode's actions, counts more contacts, there is a hit."""
+    assert isinstance(soccer.environment, SoccerField)
+    field = replace(soccer.environment, params=SoccerParams(macro=macro, time_limit=60.0))
+    task = make_task(field, Params.of(**SOCCER))
+    world = SoccerWorld(field.params)
+    seen: set[bool] = set()
+    for seed in range(4):
+        q = np.random.default_rng(seed).integers(0, 3, size=task.shape).astype(float)
+        episode, _ = task.roll_out(q, stream(np.random.SeedSequence(seed)))
+        states, touched = [world.reset()], []
+        for action in episode.actions.tolist():
+            before = world.contacts
+            states.append(world.step(action)[0])
+            touched.append(world.contacts != before)
+        assert episode.states.tolist() == states
+        assert episode.hits.tolist() == touched
+        seen.update(touched)
+    assert seen == {True, False}
 
 
 def test_soccer_trials_do_not_depend_on_each_other(soccer: Demos) -> None:

@@ -1,17 +1,23 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from replication import Demos
+from replication import trials as trials_module
+from replication.demos import content_hash
+from replication.irl import Trial, run
 from replication.params import Params
 from replication.seeds import trial_seeds
 from replication.setting import Setting
 from replication.store import Store
+from replication.tasks import Task
 from replication.trials import TRACED_TRIAL, Results, run_trials, trial_key
 
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
@@ -34,7 +40,7 @@ def _bits(results: Results) -> list[bytes]:
         for setting in results.settings
         for k in range(results.trials)
         for trial in [results.trial(setting, k)]
-        for array in (trial.errors, trial.weights, trial.q, trial.states, trial.actions)
+        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
     ]
 
 
@@ -51,6 +57,59 @@ def test_a_trial_does_not_depend_on_how_many_there_are(small_demos: Demos, tmp_p
     short = _run(small_demos, tmp_path / "short.sqlite", trials=2)
     long = _run(small_demos, tmp_path / "long.sqlite", trials=6)
     assert set(_bits(short)) <= set(_bits(long))
+
+
+def test_settings_that_share_a_task_are_computed_together(
+    small_demos: Demos, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In one chunk with those of other settings, a trial has the bits that it has alone."""
+    settings = [
+        *_settings(small_demos),
+        Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 3})),
+    ]
+    chunks: list[int] = []
+
+    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+        chunks.append(len(loops))
+        return run(task, loops)
+
+    monkeypatch.setattr(trials_module, "run", spy)
+    together = run_trials(settings, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
+    assert chunks == [3 * len(settings)]
+    for number, setting in enumerate(settings):
+        path = tmp_path / f"{number}.sqlite"
+        for trials in (1, 2, 3):  # so that each is computed in a run of its own
+            alone = run_trials([setting], trials=trials, store=Store(path), seed=5)
+        together.settings = [setting]
+        assert _bits(alone) == _bits(together)
+    assert chunks[1:] == [1] * 3 * len(settings)
+
+
+def test_settings_of_other_tasks_are_computed_apart(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What learns by other parameters, or rolls out by them, shares no chunk."""
+    settings = [
+        Setting(small_demos, "unified", Params.of(**FEW, ties=ties, rollout_ties=rollout_ties))
+        for ties, rollout_ties in (("random", "random"), ("first", "random"), ("random", "first"))
+    ]
+    tasks: list[Task] = []
+
+    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+        tasks.append(task)
+        return run(task, loops)
+
+    monkeypatch.setattr(trials_module, "run", spy)
+    run_trials(settings, trials=2, store=Store(store_path), seed=5)
+    assert tasks == [setting.task for setting in settings]
+
+
+def test_settings_know_the_hash_of_what_they_select(small_demos: Demos) -> None:
+    """The hash in a trial's key is that of the demonstrations that the method is given."""
+    for incorrect in ("none", "hit", "all"):
+        for method in ("adaboost", "unified", "unified-incorrect"):
+            setting = Setting(small_demos, method, Params.of(incorrect=incorrect))
+            assert setting.selected_hash == content_hash(setting.selected)
 
 
 def test_finished_trials_are_not_computed_again(

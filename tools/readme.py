@@ -6,35 +6,61 @@ import sys
 
 import pandas as pd
 
+from replication.claims import claims
 from replication.files import write_file
 from replication.paths import PROJECT
-from replication.tables import findings_of_sets, markdown, readable_claims
+from replication.sensitivity import findings_at_once
+from replication.tables import markdown, read_table, readable_verdicts
+from replication.verdicts import NOT_TESTABLE, REPRODUCED, overall
 
 BEGIN = "<!-- results: written by `make readme` from figures/, checked by the tests -->\n"
 END = "<!-- end of results -->\n"
-COLUMNS = ["Claim", "Place", "F", "Effect [95 %]", "Paper", "p, Holm", "Verdict"]
-CLAIMS = {
-    "Open maze": "table1_claims.csv",
-    "Maze with obstacles": "table2_claims.csv",
-    "Robot soccer": "soccer_claims.csv",
-}
-SETS = {"Open maze": "open_maze_sets.csv", "Maze with obstacles": "obstacle_maze_sets.csv"}
 
 
 def results() -> str:
-    """Return the claims on all tasks as one table, and which demonstrations save iterations."""
-    parts = []
-    for task, name in CLAIMS.items():
-        readable = readable_claims(_stored(name))[COLUMNS]
-        readable.insert(0, "Task", task)
-        parts.append(readable)
-    sets = [f"{task}:\n\n{findings_of_sets(_stored(name))}" for task, name in SETS.items()]
-    return "\n".join([markdown(pd.concat(parts)), *sets])
+    """Return the verdicts on the claims, and what they depend on."""
+    judged = read_table(PROJECT / "figures" / "claims.csv")
+    outcomes = read_table(PROJECT / "figures" / "sensitivity_outcomes.csv")
+    shares = read_table(PROJECT / "figures" / "sensitivity_shares.csv")
+    levels = read_table(PROJECT / "figures" / "sensitivity_levels.csv")
+    compared = judged[judged["direction"] != "inside"]
+    readable = readable_verdicts(compared)
+    readable["Holds with other choices"] = [
+        _holding(outcomes, id) for id in compared["id"].drop_duplicates()
+    ]
+    return "\n".join(
+        [
+            markdown(readable),
+            _numbers(judged),
+            "What the claims depend on:\n",
+            "\n".join(findings_at_once(outcomes, shares, levels)) + "\n",
+        ]
+    )
 
 
-def _stored(name: str) -> pd.DataFrame:
-    return pd.read_csv(PROJECT / "figures" / name, keep_default_na=False, na_values=[""]).fillna(
-        {"F": "", "verdict": ""}
+def _holding(outcomes: pd.DataFrame, id: str) -> str:
+    """Say in how many specifications a claim holds: of all choices at once, or one at a time."""
+    own = outcomes[outcomes["claim"] == id].set_index("group")
+    for group in ("factorial", "single"):
+        if group in own.index:
+            row = own.loc[group]
+            return f"{row['holds']} of {row['specifications'] - row['undefined']}"
+    return "–"
+
+
+def _numbers(judged: pd.DataFrame) -> str:
+    """Say how many of the published numbers lie where they should."""
+    verdicts = [
+        overall(part["verdict"].tolist())
+        for _, part in judged[judged["direction"] == "inside"].groupby("id", sort=False)
+    ]
+    tested = [one for one in verdicts if one != NOT_TESTABLE]
+    runs = claims().judging
+    return (
+        f"Of the {len(tested)} published means, SDs and single runs that could be tested, "
+        f"{tested.count(REPRODUCED)} are reproduced; [all verdicts](figures/claims.md), with the "
+        f"numbers in [`claims.csv`](figures/claims.csv), from root seed {runs.root_seed}, "
+        "which was used for nothing else before.\n"
     )
 
 

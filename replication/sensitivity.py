@@ -1,0 +1,355 @@
+"""What the claims depend on: their effects under every declared specification.
+
+Effects and intervals are those of the claims; only the number of bootstrap samples is smaller. A
+trial at the iteration cap counts as that many iterations here, and how many there are is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from replication.choices import Value
+from replication.claims import Claim
+from replication.comparisons import Key
+from replication.measures import measure_trials
+from replication.setting import Setting
+from replication.specifications import Specification, default_of
+from replication.statistics import (
+    mean_intervals,
+    sd_ratio_intervals,
+    share_interval,
+    standard_errors,
+)
+from replication.tables import pairs_near
+from replication.trials import Results
+
+HOLDS, OPEN, REVERSED = "holds", "open", "reversed"
+"""Whether an interval lies beyond the margin on the claimed side, includes it, or on the other."""
+
+UNDEFINED = "undefined"
+"""There is no effect: a ratio of SDs needs samples that vary."""
+
+MATTERS = 0.05
+"""Share of the variance from which on a choice is named in words."""
+
+Settings = Mapping[Specification, Mapping[Key, Setting]]
+
+
+def effects_table(results: Results, settings: Settings, claims: Sequence[Claim]) -> pd.DataFrame:
+    """Return one row for each claim and specification: the effect, its interval, and what it says.
+
+    A share (errors that reach zero) holds where it is above the margin itself: so few trials give
+    no interval that could be.
+
+    Parameters
+    ----------
+    results
+        The trials of all settings.
+    settings
+        The settings of each specification, by method and F index, one reading of Eq. 9 each.
+    claims
+        What to evaluate; a specification without a claim's methods gives no row.
+    """
+    measured = {
+        specification: measure_trials(results, own).groupby("method")
+        for specification, own in settings.items()
+    }
+    parts = []
+    for claim in claims:
+        wanted = {claim.x, *filter(None, [claim.y])}
+        having = [one for one, groups in measured.items() if wanted <= set(groups.groups)]
+        if not having:
+            continue
+        x = np.array([measured[one].get_group(claim.x)[claim.measure] for one in having], float)
+        y = x
+        if claim.y:
+            y = np.array([measured[one].get_group(claim.y)[claim.measure] for one in having], float)
+        capped = [
+            sum(int((measured[one].get_group(name)["converged"] == 0).sum()) for name in wanted)
+            for one in having
+        ]
+        effect, low, high = _effects(claim, x, y)
+        parts.append(
+            pd.DataFrame(
+                {
+                    "claim": claim.id,
+                    "statistic": claim.statistic,
+                    "group": [one.group for one in having],
+                    "specification": [one.name for one in having],
+                    "n": x.shape[1],
+                    "capped": capped,
+                    "effect": effect,
+                    "low": low,
+                    "high": high,
+                    "outcome": [
+                        _outcome(claim, *row) for row in zip(effect, low, high, strict=True)
+                    ],
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
+
+
+def outcome_shares(effects: pd.DataFrame) -> pd.DataFrame:
+    """Return for each claim and group in how many specifications it holds, is open, is reversed.
+
+    `share` is that of the specifications in which it holds, among those with an effect.
+    """
+    rows = []
+    for (claim, group), part in effects.groupby(["claim", "group"], sort=False):
+        counts = part["outcome"].value_counts()
+        rows.append(
+            {
+                "claim": claim,
+                "group": group,
+                "specifications": len(part),
+                **{name: int(counts.get(name, 0)) for name in (HOLDS, OPEN, REVERSED, UNDEFINED)},
+                "share": _share(part["outcome"], HOLDS),
+                "with_caps": int((part["capped"] > 0).sum()),
+                "median": float(part["effect"].median()),
+                "lowest": float(part["effect"].min()),
+                "highest": float(part["effect"].max()),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def variance_shares(effects: pd.DataFrame, specifications: Sequence[Specification]) -> pd.DataFrame:
+    """Return which share of an effect's variance over the factorial each choice accounts for.
+
+    Ratios of SDs enter by their logarithm; specifications without an effect are left out. Each
+    claim's effects are regressed on all choices at once, every value with its own coefficient. A
+    choice's share is what the sum of squares loses without it, less what as many columns of noise
+    would explain, over the total: it is about 0 for a choice that does not matter, and may be
+    slightly negative. `noise` is the share of the sampling error, estimated from the intervals;
+    `rest` is what remains: choices that act together, and choices that are correlated by chance.
+    Fewer specifications than values give NaN.
+    """
+    chosen = {one.name: dict(one.choices) for one in specifications}
+    rows = []
+    for claim, part in effects.groupby("claim", sort=False):
+        own = part[part["specification"].isin(chosen)].dropna(subset="effect")
+        bounds = own[["effect", "low", "high"]].to_numpy(float).T
+        if (own["statistic"] == "sd-ratio").any():
+            with np.errstate(divide="ignore"):  # an interval that reaches down to 0
+                bounds = np.log(bounds)
+        y, low, high = bounds
+        total = float(((y - y.mean()) ** 2).sum()) if len(y) else 0.0
+        if total == 0:
+            continue
+        design = {
+            id: pd.get_dummies(
+                pd.Series([str(chosen[name][id]) for name in own["specification"]]),
+                drop_first=True,
+            ).to_numpy(float)
+            for id, _ in specifications[0].choices
+        }
+        full, free = _residual(list(design.values()), y)
+        unexplained = full / free if free > 0 else np.nan  # fewer specifications than values
+        shares = {}
+        for id in design:
+            without, _ = _residual([block for name, block in design.items() if name != id], y)
+            width = design[id].shape[1]
+            shares[id] = (without - full - width * unexplained) / total
+        known = np.isfinite(low) & np.isfinite(high)
+        error = float((standard_errors(low[known], high[known]) ** 2).mean()) if known.any() else 0
+        noise = min(error * len(y) / total, 1.0)
+        rest = 1.0 - sum(shares.values()) - noise
+        rows += [
+            {"claim": claim, "choice": id, "share": share}
+            for id, share in {**shares, "noise": noise, "rest": rest}.items()
+        ]
+    return pd.DataFrame(rows, columns=["claim", "choice", "share"])
+
+
+def level_table(effects: pd.DataFrame, specifications: Sequence[Specification]) -> pd.DataFrame:
+    """Return for each claim, choice and value of the factorial the mean effect and what holds."""
+    rows = []
+    for claim, part in effects.groupby("claim", sort=False):
+        own = part.set_index("specification").loc[[one.name for one in specifications]]
+        for id, _ in specifications[0].choices:
+            values = [dict(one.choices)[id] for one in specifications]
+            for value in dict.fromkeys(sorted(values, key=_order)):
+                chosen = own[[other == value for other in values]]
+                rows.append(
+                    {
+                        "claim": claim,
+                        "choice": id,
+                        "value": value,
+                        "default": value == default_of(id),
+                        "specifications": len(chosen),
+                        "mean_effect": float(chosen["effect"].mean()),
+                        "holds": _share(chosen["outcome"], HOLDS),
+                        "reversed": _share(chosen["outcome"], REVERSED),
+                    }
+                )
+    return pd.DataFrame(rows)
+
+
+def findings(
+    outcomes: pd.DataFrame,
+    shares: pd.DataFrame,
+    levels: pd.DataFrame,
+    single: pd.DataFrame,
+    soccer: pd.DataFrame,
+) -> str:
+    """Return in words what the claims depend on, as a Markdown list.
+
+    Parameters
+    ----------
+    outcomes, shares, levels
+        Of :func:`outcome_shares`, :func:`variance_shares` and :func:`level_table`.
+    single, soccer
+        Effects of the specifications that change one choice.
+    """
+    lines = ["All choices at once:", "", *findings_at_once(outcomes, shares, levels)]
+    for title, effects in (("mazes", single), ("soccer", soccer)):
+        lines += ["", f"One choice at a time, {title}:", ""]
+        for claim, part in effects.groupby("claim", sort=False):
+            outcome = part.set_index("specification")["outcome"]
+            start = outcome["default"]
+            others = [name for name in (HOLDS, REVERSED, OPEN, UNDEFINED) if name != start]
+            moved = [
+                f"{other} under {', '.join(outcome.index[outcome == other])}"
+                for other in others
+                if (outcome == other).any()
+            ]
+            said = "; ".join(moved) or "the same under every other value"
+            lines.append(f"- {claim}: {start} with the defaults; {said}.")
+    return "\n".join(lines)
+
+
+def findings_at_once(
+    outcomes: pd.DataFrame, shares: pd.DataFrame, levels: pd.DataFrame
+) -> list[str]:
+    """Return in words what each claim depends on when all choices vary, a line of a list each.
+
+    Parameters
+    ----------
+    outcomes, shares, levels
+        Of :func:`outcome_shares`, :func:`variance_shares` and :func:`level_table`.
+    """
+    lines = []
+    for row in outcomes[outcomes["group"] == "factorial"].itertuples():
+        n = row.specifications - row.undefined
+        line = (
+            f"- {row.claim} holds in {row.holds} of {n} specifications ({row.share:.0%}), is open "
+            f"in {row.open} and reversed in {row.reversed}"
+        )
+        own = shares[(shares["claim"] == row.claim) & ~shares["choice"].isin(["noise", "rest"])]
+        largest = own.sort_values("share", ascending=False).head(1)
+        for one in largest[largest["share"] > MATTERS].itertuples():
+            part = levels[(levels["claim"] == row.claim) & (levels["choice"] == one.choice)]
+            by_value = ", ".join(
+                f"{value.value} {value.holds:.0%}"
+                for value in part.sort_values("holds", ascending=False, kind="stable").itertuples()
+                if not np.isnan(value.holds)
+            )
+            line += (
+                f". {one.choice} accounts for {one.share:.0%} of the variance of its effect; the "
+                f"claim holds with {by_value}"
+            )
+        lines.append(f"{line}.")
+    return lines
+
+
+def ablations_table(results: Results, settings: Mapping[str, Setting]) -> pd.DataFrame:
+    """Return one row a setting: a summary of its iterations, capped trials counting as the cap."""
+    rows = []
+    for name, setting in settings.items():
+        counts = results.iterations(setting).astype(float)
+        low, high = mean_intervals(counts[None])
+        rows.append(
+            {
+                "setting": name,
+                "n": len(counts),
+                "capped": int((~results.converged(setting)).sum()),
+                "mean": counts.mean(),
+                "low": float(low[0]),
+                "high": float(high[0]),
+                "sd": counts.std(ddof=1),
+                "median": float(np.median(counts)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def numbers_table(results: Results, settings: Mapping[tuple[int, str], Setting]) -> pd.DataFrame:
+    """Return one row for each number of incorrect demonstrations and reading of Eq. 9.
+
+    `saved` is the mean number of iterations fewer than without any, over the same seeds, with its
+    interval; `pairs` and `leaving` count the marked pairs, see
+    :func:`replication.tables.pairs_near`.
+    """
+    rows = []
+    for (number, f), setting in settings.items():
+        counts = results.iterations(setting).astype(float)
+        saved = results.iterations(settings[0, f]) - counts
+        low, high = mean_intervals(np.stack([counts, saved]))
+        near = pairs_near(setting.selected)
+        rows.append(
+            {
+                "F": f,
+                "number": number,
+                "pairs": near["pairs"],
+                "leaving": near["leaving"],
+                "capped": int((~results.converged(setting)).sum()),
+                "mean": counts.mean(),
+                "low": low[0],
+                "high": high[0],
+                "saved": saved.mean(),
+                "saved_low": low[1],
+                "saved_high": high[1],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _order(value: Value) -> tuple[bool, float, str]:
+    number = isinstance(value, (int, float))
+    return (not number, float(value) if number else 0.0, str(value))
+
+
+def _effects(
+    claim: Claim, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return a claim's effect with its interval for each row of trials, [specification]."""
+    if claim.statistic == "mean-difference":
+        return (x - y).mean(axis=1), *mean_intervals(x - y)
+    if claim.statistic == "mean":
+        return x.mean(axis=1), *mean_intervals(x)
+    if claim.statistic == "sd-ratio":
+        return sd_ratio_intervals(x, y)
+    assert claim.statistic == "share", f"{claim.id} has no effect under a specification"
+    share = np.minimum(x.mean(axis=1), y.mean(axis=1))
+    n = x.shape[1]
+    low, high = zip(*(share_interval(round(one * n), n) for one in share), strict=True)
+    return share, np.array(low), np.array(high)
+
+
+def _share(outcomes: pd.Series, outcome: str) -> float:
+    """Return the share of an outcome among specifications that have an effect."""
+    defined = outcomes[outcomes != UNDEFINED]
+    return float((defined == outcome).mean())
+
+
+def _outcome(claim: Claim, effect: float, low: float, high: float) -> str:
+    if np.isnan(effect):
+        return UNDEFINED
+    if claim.statistic == "share":
+        return HOLDS if effect > claim.margin else REVERSED if high < claim.margin else OPEN
+    below, above = high < claim.margin, low > claim.margin
+    if not (below or above):
+        return OPEN
+    return HOLDS if below == (claim.direction == "less") else REVERSED
+
+
+def _residual(blocks: Sequence[NDArray[np.float64]], y: NDArray[np.float64]) -> tuple[float, int]:
+    """Return the residual sum of squares of a regression with a constant, and its freedom."""
+    matrix = np.column_stack([np.ones(len(y)), *blocks])
+    fitted = matrix @ np.linalg.lstsq(matrix, y, rcond=None)[0]
+    return float(((y - fitted) ** 2).sum()), len(y) - int(np.linalg.matrix_rank(matrix))

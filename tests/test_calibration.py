@@ -1,0 +1,226 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import integrate, stats
+
+from replication import Demos
+from replication.calibration import (
+    CALIBRATED,
+    PAIR,
+    ROOT,
+    TRIALS,
+    calibration_table,
+    chosen,
+    divergence,
+    findings,
+    grid,
+    grid_settings,
+)
+from replication.choices import register
+from replication.claims import claims
+from replication.paper import Published
+from replication.paths import PROJECT
+from replication.store import Store
+from replication.tables import read_table
+from replication.trials import run_trials
+
+STORED = PROJECT / "figures" / "calibration.csv"
+
+
+@pytest.fixture(scope="module")
+def stored() -> pd.DataFrame:
+    """Read the published grid."""
+    if not STORED.exists():
+        pytest.skip("figures/calibration.csv is not published yet")
+    return read_table(STORED)
+
+
+# --- the criterion ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("mean", "sd"), [(40.1, 4.73), (39.1, 5.2), (45.0, 3.0), (30.0, 9.0)])
+def test_divergence_by_integration(mean: float, sd: float) -> None:
+    """The closed form is the integral of p log(p / q), p being the published distribution."""
+    p, q = stats.norm(PAIR.mean, PAIR.sd), stats.norm(mean, sd)
+    due, _ = integrate.quad(
+        lambda x: p.pdf(x) * (p.logpdf(x) - q.logpdf(x)),
+        PAIR.mean - 12 * PAIR.sd,
+        PAIR.mean + 12 * PAIR.sd,
+    )
+    assert divergence(mean, sd, PAIR) == pytest.approx(due, abs=1e-7)
+
+
+@given(st.floats(1, 100), st.floats(0.1, 50), st.floats(1, 100), st.floats(0.1, 50))
+def test_divergence_is_least_at_the_published_pair(
+    mean: float, sd: float, paper_mean: float, paper_sd: float
+) -> None:
+    """It is zero at the pair itself, nowhere below, and grows with the distance of the means."""
+    paper = Published("here", paper_mean, paper_sd)
+    assert divergence(paper_mean, paper_sd, paper) == pytest.approx(0.0, abs=1e-12)
+    assert divergence(mean, sd, paper) >= -1e-12
+    further = paper_mean + 2 * (mean - paper_mean)
+    assert divergence(further, sd, paper) >= divergence(mean, sd, paper)
+
+
+def test_divergence_is_the_likelihood_of_the_published_sample() -> None:
+    """Of two points the nearer one makes a sample with the published mean and SD likelier."""
+    sample = stats.zscore(np.random.default_rng(1).normal(size=100)) * PAIR.sd + PAIR.mean
+    points = [(39.1, 5.2), (41.0, 4.0), (36.0, 4.7), (40.1, 9.0)]
+    likelihoods = [stats.norm(*point).logpdf(sample).mean() for point in points]
+    divergences = [divergence(*point, PAIR) for point in points]
+    for (a, one), (b, other) in itertools.combinations(
+        zip(likelihoods, divergences, strict=True), 2
+    ):
+        assert a - b == pytest.approx(other - one)
+
+
+@pytest.mark.parametrize(("mean", "sd"), [(40.1, 0.0), (np.nan, np.nan), (40.1, np.nan)])
+def test_points_that_are_out_are_infinitely_far(mean: float, sd: float) -> None:
+    """A point without any spread, or with a trial at the cap, is never the nearest."""
+    assert divergence(mean, sd, PAIR) == np.inf
+
+
+# --- the grid --------------------------------------------------------------------------------
+
+
+def test_grid_has_all_registered_values() -> None:
+    """The declared 120 points: every value of four choices, but for the ablation ALPHA = 0."""
+    points = grid()
+    assert len(points) == len(set(points)) == 120
+    for at, id in enumerate(CALIBRATED):
+        entry = register()[id]
+        values = {entry.default, *entry.alternatives} - ({0.0} if id == "ALPHA" else set())
+        assert {point[at] for point in points} == values
+    assert chosen() in points
+    assert all(register()[id].rule.startswith("Calibrated") for id in CALIBRATED)
+    assert {id for id, one in register().items() if one.rule.startswith("Calibrated")} == set(
+        CALIBRATED
+    )
+
+
+def test_calibration_is_apart_from_the_judging_run() -> None:
+    """Its root seed is among the explored ones, and what it used gets no verdict."""
+    assert claims().judging.root_seed != ROOT
+    assert any(ROOT in run.root_seeds for run in claims().explored)
+    for id in ("MEAN-UNIFIED-OPEN", "SD-UNIFIED-OPEN"):
+        claim = claims().by_id(id)
+        assert "printed" in claim.used
+        assert claim.published("unified").mean == PAIR.mean
+
+
+def test_settings_differ_in_the_grid_alone(small_demos: Demos) -> None:
+    """Each point is a setting of the unified method with its four values, all else at defaults."""
+    settings = grid_settings(small_demos.maze)
+    assert list(settings) == grid()
+    for (leg, alpha, f_start, ties), setting in settings.items():
+        params = setting.params
+        assert setting.method == "unified"
+        assert (params.update.alpha, params.update.f_start) == (alpha, f_start)
+        assert params.learner.ties == ties
+        assert set(params.differences()) <= set(CALIBRATED)
+        other = settings[leg, *chosen()[1:]]
+        assert setting.demos == other.demos
+    assert settings[chosen()].params.differences() == {}
+
+
+def test_table_of_a_run(small_demos: Demos, tmp_path: object) -> None:
+    """The table has the trials' own numbers, the nearest point first, and one default."""
+    every = grid_settings(small_demos.maze)
+    points = [chosen(), (2, 0.9, 0.5, "random"), (2, 0.1, 1.0, "first")]
+    settings = {point: every[point] for point in points}
+    store = Store(tmp_path / "trials.sqlite")  # type: ignore[operator]
+    results = run_trials(list(settings.values()), trials=4, store=store, seed=ROOT)
+    table = calibration_table(results, settings)
+    assert table["default"].sum() == 1
+    assert table["divergence"].is_monotonic_increasing
+    for row in table.to_dict("records"):
+        setting = settings[tuple(row[id] for id in CALIBRATED)]
+        counts = results.iterations(setting)
+        assert (row["n"], row["capped"]) == (4, 0)
+        assert row["mean"] == pytest.approx(counts.mean())
+        assert row["sd"] == pytest.approx(counts.std(ddof=1))
+        assert row["divergence"] == divergence(row["mean"], row["sd"], PAIR)
+        assert row["default"] == (setting is settings[chosen()])
+
+
+# --- what is said of it ----------------------------------------------------------------------
+
+
+def near(table: pd.DataFrame) -> pd.Series:
+    """Return which points have both numbers where those of a sample of the paper's would lie."""
+    n = int(table["n"].iloc[0])
+    half = stats.t.ppf(0.975, PAIR.n - 1) * PAIR.sd * (1 / n + 1 / PAIR.n) ** 0.5
+    ratio = (table["sd"] / PAIR.sd) ** 2  # of variances: F with n - 1 and 99 degrees of freedom
+    inside = ratio.between(*stats.f(n - 1, PAIR.n - 1).interval(0.95))
+    return ((table["mean"] - PAIR.mean).abs() <= half) & inside & (table["capped"] == 0)
+
+
+def made_up() -> pd.DataFrame:
+    """Make a table of the grid up."""
+    rng = np.random.default_rng(4)
+    table = pd.DataFrame(grid(), columns=list(CALIBRATED))
+    table["n"], table["capped"] = TRIALS, 0
+    table["mean"], table["sd"] = rng.normal(40, 3, 120), rng.uniform(2, 8, 120)
+    table["median"] = table["mean"]
+    capped = table.index % 7 == 0
+    table.loc[capped, ["mean", "sd"]] = np.nan
+    table.loc[capped, "capped"] = 2
+    table["divergence"] = [
+        divergence(*row, PAIR) for row in zip(table["mean"], table["sd"], strict=True)
+    ]
+    table["default"] = [point == chosen() for point in grid()]
+    return table.sort_values("divergence", ignore_index=True)
+
+
+def test_findings_count_the_points_that_would_do() -> None:
+    """The number of points and their values are those of a recount; the best one is named."""
+    table = made_up()
+    text = findings(table)
+    assert 0 < near(table).sum() < 120
+    assert f"But {near(table).sum()} of the 120 points" in text
+    best = table.iloc[0]
+    assert f"mean of {best['mean']:.2f} (SD {best['sd']:.2f}) in {TRIALS} trials" in text
+    assert ", ".join(f"{id} = {best[id]}" for id in CALIBRATED) in text
+    for id in CALIBRATED:
+        values = sorted(table[near(table)][id].unique())
+        assert f"{id}: {', '.join(map(str, values))}" in text
+    assert "The nearest point is " + ("our" if best["default"] else "NOT our") in text
+
+
+def test_findings_say_whether_the_nearest_is_the_default() -> None:
+    """It says so if the nearest point is not what the register has."""
+    table = made_up()
+    table["default"] = False
+    assert findings(table).startswith("The nearest point is NOT our default: ")
+    table.loc[0, "default"] = True
+    assert findings(table).startswith("The nearest point is our default: ")
+
+
+# --- the published grid ----------------------------------------------------------------------
+
+
+def test_defaults_are_the_nearest_point(stored: pd.DataFrame) -> None:
+    """The first row of the published grid is what the register has, and the only default."""
+    assert tuple(stored.loc[0, list(CALIBRATED)]) == chosen()
+    assert stored["default"].tolist() == [True] + [False] * 119
+
+
+def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
+    """Each point is there once with the declared number of trials, the nearest first."""
+    points = set(stored[list(CALIBRATED)].itertuples(index=False, name=None))
+    assert points == set(grid())
+    assert set(stored["n"]) == {TRIALS}
+    assert stored["divergence"].is_monotonic_increasing
+    due = [divergence(*row, PAIR) for row in zip(stored["mean"], stored["sd"], strict=True)]
+    assert stored["divergence"].tolist() == pytest.approx(due)
+
+
+def test_published_findings_are_recounted(stored: pd.DataFrame) -> None:
+    """What the notebook says of the grid counts the points of the published table."""
+    assert f"But {near(stored).sum()} of the 120 points" in findings(stored)
