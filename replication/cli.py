@@ -131,21 +131,33 @@ def run(
     timeout: Annotated[
         int, typer.Option(min=1, metavar="SECONDS", help="Time that one cell may take.")
     ] = 3600,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Run what is up to date, too; compute every trial again."),
+    ] = False,
+    scheduler: Annotated[
+        str,
+        typer.Option(metavar="ADDRESS", help="Send trials to a Dask scheduler: tcp://HOST:PORT."),
+    ] = "",
     parameters: Pairs = None,
 ) -> None:
     """Run notebooks and publish their figures, tables and data.
 
-    Outputs go to figures; those of --profile quick to build/quick, and those of a run with --seed
-    or with -p (but for jobs and store) to build/custom.
+    A notebook is skipped if nothing that its outputs depend on has changed. Outputs go to figures;
+    those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
+    and store) to build/custom.
     """
-    from replication.regenerate import RunError, run_name, run_notebooks
+    from replication.notebooks import RunError
+    from replication.regenerate import executed_folder, run_name, run_notebooks
 
     # A polite kill ends like Ctrl-C: the kernel and its workers stop, and the stage is removed.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
     values = _values(parameters)
     name = run_name(profile.value, seed=seed, parameters=values)
-    target = out or paths.PROJECT / ("figures" if name == "paper" else f"build/{name}")
+    target = out or (_outputs(profile) if name == profile.value else paths.PROJECT / "build/custom")
     try:
         published = run_notebooks(
             list(dict.fromkeys(files)),
@@ -155,8 +167,13 @@ def run(
             seed=seed,
             parameters=values,
             timeout=timeout,
+            force=force,
+            scheduler=scheduler,
             echo=typer.echo,
         )
+    except KeyboardInterrupt:
+        kept = "finished notebooks" if force else "finished notebooks and trials"
+        _fail(f"interrupted; {kept} are kept, and the same command goes on from there", 130)
     except RunError as error:
         if error.details:
             plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
@@ -165,14 +182,82 @@ def run(
     for table in published:
         if table.suffix == ".md" and table.stem != "claims":
             typer.echo(f"\n{table.name}\n\n{table.read_text(encoding='utf-8').strip()}")
-    executed = paths.PROJECT / "build" / "executed" / name
-    typer.echo(f"\noutputs ({len(published)}): {_short(target)}")
-    typer.echo(f"executed notebooks: {_short(executed)}")
-    if target / "claims.csv" in published:
+    typer.echo(f"\noutputs ({len(published)} new): {_short(target)}")
+    typer.echo(f"executed notebooks: {_short(executed_folder(target, name))}")
+    if any(file.stem == "claims" for file in files) and (target / "claims.csv").exists():
         from replication.tables import read_table, verdict_lines
 
         lines = verdict_lines(read_table(target / "claims.csv"))
         typer.echo("\nThe paper's claims:\n" + "\n".join(lines))
+
+
+@app.command(epilog="Example: replicate status")
+def status(
+    profile: Annotated[
+        Profile, typer.Option(help="The profile that the outputs belong to.")
+    ] = Profile.PAPER,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
+) -> None:
+    """Say which figures and tables are up to date, why others are not, and what to do."""
+    from replication.regenerate import executed_folder, prepare
+    from replication.status import status_lines
+
+    target = out or _outputs(profile)
+    runs = prepare(_all_notebooks(), profile=profile.value)
+    folder = executed_folder(target, profile.value)
+    typer.echo("\n".join(status_lines(runs, target, folder)))
+
+
+@app.command(epilog="Example: replicate verify")
+def verify(
+    profile: Annotated[
+        Profile, typer.Option(help="The profile that the outputs belong to.")
+    ] = Profile.PAPER,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Worker processes.")] = None,
+) -> None:
+    """Prove the outputs: hash the files, check the packages, recompute one trial in twenty.
+
+    Exit code 0 if everything agrees, else 1.
+    """
+    import joblib
+
+    from replication.verification import verify as check_all
+
+    target = out or _outputs(profile)
+    store = paths.PROJECT / "build" / "trials.sqlite"
+    wrong = check_all(target, store, jobs=jobs or joblib.cpu_count(), echo=typer.echo)
+    for one in wrong:
+        typer.echo(f"error: {one}", err=True)
+    typer.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
+    raise typer.Exit(int(bool(wrong)))
+
+
+@app.command(epilog="Example: replicate clean --dry-run")
+def clean(
+    profile: Annotated[
+        Profile, typer.Option(help="The profile that the outputs belong to.")
+    ] = Profile.PAPER,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what would be removed.")
+    ] = False,
+) -> None:
+    """Remove files among the outputs that no notebook declares."""
+    from replication.regenerate import prepare
+    from replication.status import undeclared
+
+    target = out or _outputs(profile)
+    for path in undeclared(prepare(_all_notebooks(), profile=profile.value), target):
+        if not dry_run:
+            path.unlink()
+        typer.echo(f"{'would remove' if dry_run else 'removed'} {_short(path)}")
+
+
+def _outputs(profile: Profile) -> Path:
+    """Return the folder that a profile's outputs go to."""
+    paper = profile is Profile.PAPER
+    return paths.PROJECT / ("figures" if paper else f"build/{profile.value}")
 
 
 @app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")
@@ -410,6 +495,13 @@ def _short(path: Path) -> str:
     absolute = path.resolve()
     below = absolute.is_relative_to(Path.cwd())
     return os.path.relpath(absolute) if below else str(absolute)
+
+
+def _interrupt(*_: object) -> NoReturn:
+    """Interrupt a run, once: what follows stops the kernel and cleans up, which takes a second."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _fail(message: str, code: int = 2) -> NoReturn:

@@ -22,6 +22,10 @@ def write_file(path: str | os.PathLike[str], content: str | bytes) -> Path:
     data = content.encode() if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=".draft-", dir=target.parent) as folder:
         draft = Path(folder) / "draft"
-        draft.write_bytes(data)
-        draft.replace(target)
+        try:
+            draft.write_bytes(data)
+            draft.replace(target)
+        except OSError as error:
+            error.filename = str(target)  # a full disk names no file, or the draft
+            raise
     return target

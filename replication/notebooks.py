@@ -7,10 +7,12 @@ what a run writes into the folder `out`, one of the parameters::
         "replication": {
             "outputs": ["fig04.png"],
             "merged": ["trials.csv"],
+            "inputs": ["replication/choices.toml"],
             "profiles": {"quick": {"trials": 6}, "paper": {"trials": 100}},
         }
     }
 
+`inputs` are files of the project that the notebook reads without having them as parameters.
 `merged` outputs hold rows of several notebooks: the published file is there when the notebook
 starts, and the notebook replaces its own rows. A profile is a set of parameter values; under a
 profile that it does not name, a notebook keeps the literals of its parameters cell.
@@ -37,6 +39,14 @@ class NotebookError(ValueError):
     """A notebook, or what it was asked for, that cannot be run; the message is one line."""
 
 
+class RunError(RuntimeError):
+    """A run that failed; the message is one line, `details` the failing cell's traceback."""
+
+    def __init__(self, message: str, details: str = "") -> None:
+        super().__init__(message)
+        self.details = details
+
+
 @dataclass(frozen=True)
 class Notebook:
     """A notebook that was read and checked.
@@ -51,6 +61,8 @@ class Notebook:
         The parameters and their values, from the parameters cell.
     outputs, merged
         Files that a run writes; those of them that it shares with other notebooks.
+    inputs
+        Files that it reads, from the project's folder on.
     profiles
         Parameter values by the name of the profile.
     """
@@ -61,6 +73,7 @@ class Notebook:
     literals: Mapping[str, Any]
     outputs: tuple[str, ...]
     merged: tuple[str, ...]
+    inputs: tuple[str, ...]
     profiles: Mapping[str, Mapping[str, Any]]
 
     @property
@@ -82,7 +95,10 @@ class Notebook:
             literal = self.literals[name]
             if not _is_json(value) or not _same_type(value, literal):
                 wanted = f"{_kind(literal)}, such as {json.dumps(literal)}"
-                refuse(self.path, f"parameter {name!r} is {wanted}; {value!r} is {_kind(value)}")
+                refuse(
+                    self.path,
+                    f"parameter {name!r} is {wanted}; {value!r} is {_kind(value)}",
+                )
 
 
 def read_notebook(path: Path) -> Notebook:
@@ -110,7 +126,10 @@ def read_notebook(path: Path) -> Notebook:
         if cell.cell_type == "code" and "parameters" in cell.metadata.get("tags", [])
     ]
     if len(tagged) != 1:
-        refuse(path, f"{len(tagged)} cells have the tag 'parameters'; exactly one must have it")
+        refuse(
+            path,
+            f"{len(tagged)} cells have the tag 'parameters'; exactly one must have it",
+        )
     literals = _literals(path, node.cells[tagged[0]].source)
     if not isinstance(literals.get("out"), str):
         refuse(path, "the parameters cell must have out = 'FOLDER', where the outputs go")
@@ -119,16 +138,19 @@ def read_notebook(path: Path) -> Notebook:
     if not isinstance(declared, dict) or "outputs" not in declared:
         refuse(path, 'its metadata do not declare {"replication": {"outputs": [...]}}')
     for key in declared:
-        if key not in ("outputs", "merged", "profiles"):
-            known = ["outputs", "merged", "profiles"]
+        known = ["outputs", "merged", "inputs", "profiles"]
+        if key not in known:
             refuse(path, str(unknown_name(key, known, "declaration")))
     outputs = _file_names(path, "outputs", declared["outputs"])
     merged = _file_names(path, "merged", declared.get("merged", []))
     profiles = declared.get("profiles", {})
     if not isinstance(profiles, dict) or not all(isinstance(p, dict) for p in profiles.values()):
         refuse(path, "'profiles' must hold an object of parameter values for each profile")
+    inputs = declared.get("inputs", [])
+    if not isinstance(inputs, list) or not all(isinstance(name, str) for name in inputs):
+        refuse(path, "'inputs' must be a list of files")
     every = tuple(dict.fromkeys((*outputs, *merged)))
-    notebook = Notebook(path, node, tagged[0], literals, every, merged, profiles)
+    notebook = Notebook(path, node, tagged[0], literals, every, merged, tuple(inputs), profiles)
     for profile, values in profiles.items():
         if "out" in values:
             refuse(path, f"profile {profile!r} sets 'out', which each run chooses")
@@ -141,7 +163,10 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
         statements = ast.parse(source).body
     except (SyntaxError, ValueError) as error:
         line = getattr(error, "lineno", 1)
-        refuse(path, f"line {line} of the parameters cell is not Python: {first_line(error)}")
+        refuse(
+            path,
+            f"line {line} of the parameters cell is not Python: {first_line(error)}",
+        )
     literals: dict[str, Any] = {}
     for statement in statements:
         line = statement.lineno
@@ -159,7 +184,10 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
             mend = "a parameter must be a JSON value: null, true, a number, text, a list, an object"
             refuse(path, f"line {line} of the parameters cell, `{text}`: {mend}")
         if name in literals:
-            refuse(path, f"line {line} of the parameters cell, `{text}`: {name!r} is there twice")
+            refuse(
+                path,
+                f"line {line} of the parameters cell, `{text}`: {name!r} is there twice",
+            )
         literals[name] = value
     return literals
 
@@ -169,7 +197,10 @@ def _file_names(path: Path, key: str, names: Any) -> tuple[str, ...]:
         refuse(path, f"{key!r} must be a list of file names")
     for name in names:
         if not isinstance(name, str) or not re.fullmatch(r"\w[\w.-]*", name):
-            refuse(path, f"{key!r} holds {name!r}, which is not a plain file name without a folder")
+            refuse(
+                path,
+                f"{key!r} holds {name!r}, which is not a plain file name without a folder",
+            )
         if names.count(name) > 1:
             refuse(path, f"{key!r} holds {name!r} twice")
     return tuple(names)
@@ -194,7 +225,12 @@ def _same_type(value: Any, literal: Any) -> bool:
 def _kind(value: Any) -> str:
     if value is None:
         return "null"
-    kinds = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
+    kinds = {
+        bool: "true or false",
+        int: "a whole number",
+        float: "a number",
+        str: "text",
+    }
     return (kinds | {list: "a list", dict: "an object"}).get(type(value), "no JSON value")
 
 

@@ -1,63 +1,80 @@
-"""Execute notebooks through papermill and publish the files that they declare, or nothing."""
+"""Run notebooks that are not up to date, and publish the files that they declare, or nothing.
+
+A notebook is fresh if nothing that its outputs depend on has changed since they were made, see
+:mod:`replication.provenance`. Trials that finished stay in the store, so that a run that broke off
+goes on from there.
+"""
 
 from __future__ import annotations
 
-import copy
+import datetime
+import fcntl
 import json
-import logging
 import os
-import re
-import shlex
+import platform
 import shutil
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import joblib
-import nbformat
-import papermill
-from nbclient.exceptions import CellTimeoutError, DeadKernelError
-from papermill.exceptions import PapermillExecutionError
 
-from replication import paths
+from replication import paths, provenance
 from replication.files import write_file
-from replication.notebooks import Notebook, NotebookError, first_line, read_notebook, refuse
+from replication.notebooks import (
+    Notebook,
+    NotebookError,
+    RunError,
+    read_notebook,
+    refuse,
+)
 
 TIMEOUT = 3600
 """Seconds that one cell may take unless told otherwise."""
 
-STARTS = 3
-"""Attempts at starting a kernel: now and then another program takes its port."""
+RUNS = "run.json"
+"""What differs from run to run, beside the executed notebooks."""
 
-KERNEL = "replication"
+LOCK = ".lock"
 
-NEUTRAL = frozenset({"jobs", "store"})
-"""Parameters that leave every result as it is."""
-
-MISTAKES = frozenset({"ChoiceError", "DemoError", "MazeError"})
-"""What a cell raises when the user's parameters or files are at fault, not the notebook."""
-
-# What papermill logs of a failure is said again, and better, by the error that is raised.
-logging.getLogger("papermill").addHandler(logging.NullHandler())
+FRESH, STALE, MISSING, PROSE = "fresh", "stale", "missing", "prose"
 
 
-class RunError(RuntimeError):
-    """A run that failed; the message is one line, `details` the failing cell's traceback."""
+@dataclass(frozen=True)
+class Run:
+    """A notebook with the parameters of a run, and everything that its outputs depend on."""
 
-    def __init__(self, message: str, details: str = "") -> None:
-        super().__init__(message)
-        self.details = details
+    notebook: Notebook
+    values: Mapping[str, Any]
+    inputs: provenance.Inputs
+
+
+@dataclass(frozen=True)
+class State:
+    """Whether the outputs of a notebook are up to date.
+
+    `kind` is "fresh", "stale", "missing", or "prose" where only text has changed that is not
+    executed; `why` says what has changed.
+    """
+
+    kind: str
+    why: tuple[str, ...] = ()
 
 
 # --- running ---------------------------------------------------------------------------------
 
 
 def run_name(
-    profile: str, *, seed: int | None = None, parameters: Mapping[str, Any] | None = None
+    profile: str,
+    *,
+    seed: int | None = None,
+    parameters: Mapping[str, Any] | None = None,
 ) -> str:
     """Name what a run is: its profile, or "custom" where a result may differ from the profile's.
 
@@ -71,8 +88,40 @@ def run_name(
 
 def _changes(seed: int | None, parameters: Mapping[str, Any] | None) -> list[str]:
     """Return the options by which a run departs from its profile."""
-    named = [f"-p {name}" for name in parameters or {} if name not in NEUTRAL]
+    named = [f"-p {name}" for name in parameters or {} if name not in provenance.NEUTRAL]
     return named if seed is None else [*named, "--seed"]
+
+
+def prepare(
+    notebooks: Sequence[Path],
+    *,
+    profile: str,
+    jobs: int | None = None,
+    seed: int | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> list[Run]:
+    """Read notebooks and check everything that can be checked before one runs.
+
+    Raises
+    ------
+    NotebookError
+        If a notebook cannot be run, or a parameter is unknown or of the wrong type.
+    """
+    if parameters and "out" in parameters:
+        raise NotebookError("'out' is the folder that the outputs are published from; use --out")
+    runs = []
+    for notebook in map(read_notebook, notebooks):
+        values = {**notebook.profiles.get(profile, {}), **(parameters or {})}
+        if jobs is not None:
+            values.setdefault("jobs", jobs)
+        elif "jobs" in notebook.literals:
+            values.setdefault("jobs", joblib.cpu_count())
+        if seed is not None:
+            values["seed"] = seed
+        notebook.check(values)
+        runs.append(Run(notebook, values, provenance.inputs_of(notebook, values)))
+    _check_apart([run.notebook for run in runs])
+    return runs
 
 
 def run_notebooks(
@@ -85,14 +134,17 @@ def run_notebooks(
     parameters: Mapping[str, Any] | None = None,
     executed: Path | None = None,
     timeout: int = TIMEOUT,
+    force: bool = False,
+    scheduler: str = "",
     progress: bool | None = None,
     echo: Callable[[str], object] = print,
 ) -> list[Path]:
-    """Run notebooks one after another and publish their outputs.
+    """Run those notebooks that are not up to date and publish their outputs.
 
     Everything is checked before the first one runs. The outputs of a notebook are published
     together, after it has run to its end and has written what it declares and nothing else; when
-    it fails, earlier outputs stay as they were and the remaining notebooks do not run.
+    it fails, earlier outputs stay as they were and the remaining notebooks do not run. A second
+    run into the same folder waits for the first.
 
     Parameters
     ----------
@@ -111,10 +163,13 @@ def run_notebooks(
     parameters
         Other parameter values, which every notebook must know.
     executed
-        Folder for the executed notebooks, of failed runs too; `build/executed` by default. They
-        go to its sub-folder named by :func:`run_name`.
+        Folder for the executed notebooks, of failed runs too, see :func:`executed_folder`.
     timeout
         Seconds that one cell may take.
+    force
+        Whether to run what is up to date, too, and to compute every trial again.
+    scheduler
+        Address of a Dask scheduler that trials are sent to.
     progress
         Whether progress bars are drawn; None draws them on a terminal only.
     echo
@@ -133,7 +188,7 @@ def run_notebooks(
         demonstrations: then earlier notebooks ran.
     RunError
         If a cell failed, took too long or killed its kernel, or if the files in `out` are not the
-        declared ones.
+        declared ones or cannot be written.
     """
     changes = _changes(seed, parameters)
     if profile != "paper":
@@ -143,57 +198,201 @@ def run_notebooks(
             f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
             f"for a run with {', '.join(changes)}"
         )
-    runs = []
-    for notebook in map(read_notebook, notebooks):
-        values = {**notebook.profiles.get(profile, {}), **(parameters or {})}
-        if parameters and "out" in parameters:
-            raise NotebookError(
-                "'out' is the folder that the outputs are published from; use --out"
-            )
-        if jobs is not None:
-            values.setdefault("jobs", jobs)
-        elif "jobs" in notebook.literals:
-            values.setdefault("jobs", joblib.cpu_count())
-        if seed is not None:
-            values["seed"] = seed
-        notebook.check(values)
-        for target in (out / name for name in notebook.outputs):
+    runs = prepare(notebooks, profile=profile, jobs=jobs, seed=seed, parameters=parameters)
+    folder = executed or executed_folder(out, run_name(profile, seed=seed, parameters=parameters))
+    for run in runs:
+        for target in (out / name for name in run.notebook.outputs):
             if target.is_dir():
-                refuse(target, f"is a folder, but {notebook.name} writes a file of that name")
-        runs.append((notebook, values))
-    _check_apart([notebook for notebook, _ in runs])
+                refuse(
+                    target,
+                    f"is a folder, but {run.notebook.name} writes a file of that name",
+                )
+    with ExitStack() as locks:
+        for needed in dict.fromkeys((out, folder)):
+            try:
+                needed.mkdir(parents=True, exist_ok=True)
+                locks.enter_context(_exclusive(needed, echo))
+            except OSError as error:
+                said = (error.strerror or str(error)).lower()
+                refuse(needed, f"cannot be used as a folder: {said}")
+        waiting = []
+        for run in runs:
+            name, state = run.notebook.name, state_of(run, out, folder)
+            if state.kind == FRESH and not force:
+                echo(f"{name}: fresh, nothing to do")
+            elif state.kind == PROSE and not force:
+                _render(run, folder)
+                echo(f"{name}: fresh; its text is brought up to date, nothing is executed")
+            else:
+                waiting.append(run)
+        if not waiting:
+            return []
+        bars = sys.stderr.isatty() if progress is None else progress
+        options = {"timeout": timeout, "scheduler": scheduler}
+        return _run_all(waiting, out, folder, force=force, bars=bars, echo=echo, **options)
 
-    name = run_name(profile, seed=seed, parameters=parameters)
-    folder = (executed or paths.PROJECT / "build" / "executed") / name
-    for needed in (out, folder):
-        try:
-            needed.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            refuse(needed, f"cannot be used as a folder: {(error.strerror or str(error)).lower()}")
 
-    drawn = sys.stderr.isatty() if progress is None else progress
+def _run_all(
+    runs: Sequence[Run],
+    out: Path,
+    folder: Path,
+    *,
+    force: bool,
+    bars: bool,
+    echo: Callable[[str], object],
+    **options: Any,
+) -> list[Path]:
+    """Run notebooks one after another; `options` are those of `execution.execute`."""
+    from replication.execution import execute  # loads papermill, which takes a second
+    from replication.progress import Display
+
+    commit, clean = _commit()
+    machine = f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores"
+    where: dict[str, Any] = {"commit": commit, "clean": clean, "machine": machine}
     published: list[Path] = []
-    for notebook, values in runs:
-        shown = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
-        echo(f"{notebook.name}: running, {shown}" if shown else f"{notebook.name}: running")
-        began = time.perf_counter()
-        with tempfile.TemporaryDirectory(prefix="replicate-") as scratch:
-            stage = Path(scratch) / "out"
+    with (
+        Display(len(runs), bars=bars) as display,
+        tempfile.TemporaryDirectory(prefix="replicate-") as scratch,
+    ):
+        for run in runs:
+            notebook, values = run.notebook, dict(run.values)
+            shown = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
+            echo(f"{notebook.name}: running, {shown}" if shown else f"{notebook.name}: running")
+            if "store" in notebook.literals:
+                store = _store(values.get("store", notebook.literals["store"]), out)
+                values["store"] = str(Path(scratch) / "trials.sqlite" if force else store)
+            display.begin(notebook.name)
+            _remember(folder, notebook.name, None)
+            began = time.monotonic()
+            stage = Path(scratch) / notebook.name
             stage.mkdir()
             stamps = _copy_merged(notebook, out, stage)
-            draft = Path(scratch) / f"{notebook.name}.ipynb"
-            try:
-                with _private_kernel(Path(scratch), progress=drawn):
-                    _execute(notebook, {**values, "out": str(stage)}, draft, timeout, drawn)
-            finally:
-                if draft.exists():
-                    text = _clean(notebook, draft, stage, out)
-                    write_file(folder / f"{notebook.name}.ipynb", text)
+            execute(
+                notebook,
+                values,
+                stage,
+                target=out,
+                executed=folder / f"{notebook.name}.ipynb",
+                display=display,
+                **options,
+            )
             _check_outputs(notebook, stage, stamps)
             published += _publish(notebook, stage, out)
-        seconds = time.perf_counter() - began
-        echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s")
+            provenance.record(out, notebook, run.inputs)
+            shutil.rmtree(stage)
+            seconds = time.monotonic() - began
+            circumstances = {"seconds": round(seconds, 1), "prose": _prose(notebook)}
+            _remember(folder, notebook.name, where | circumstances | {"finished": _now()})
+            display.end()
+            echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s")
     return list(dict.fromkeys(published))
+
+
+def executed_folder(out: Path, name: str) -> Path:
+    """Return where executed notebooks go: below `build`, or beside outputs outside the project."""
+    if out.resolve().is_relative_to(paths.PROJECT):
+        return paths.PROJECT / "build" / "executed" / name
+    return out / "executed"
+
+
+def _store(store: str, out: Path) -> Path:
+    """Return the store's file: in `out` where the project cannot be written."""
+    path = paths.resolve(store)
+    folder = path.parent
+    while not folder.exists():
+        folder = folder.parent
+    return path if os.access(folder, os.W_OK) else out.resolve() / path.name
+
+
+# --- what is up to date ----------------------------------------------------------------------
+
+
+def state_of(run: Run, out: Path, folder: Path) -> State:
+    """Return whether a notebook's outputs in `out`, executed in `folder`, are up to date."""
+    name = run.notebook.name
+    entry = provenance.read_manifest(out).get(name)
+    if entry is None:
+        own = set(run.notebook.outputs) - set(run.notebook.merged)
+        some = any((out / output).exists() for output in own)
+        unknown = ("there is no record of how they were made",)
+        return State(STALE, unknown) if some else State(MISSING)
+    lost = provenance.damaged(out, entry)
+    if len(lost) == len(entry["outputs"]) and set(lost.values()) == {"missing"}:
+        return State(MISSING)
+    why = provenance.changes(entry["inputs"], run.inputs)
+    why += [f"{output} is {how}" for output, how in lost.items()]
+    if why:
+        return State(STALE, tuple(why))
+    done = read_runs(folder).get(name)
+    if done is None or not (folder / f"{name}.ipynb").exists():
+        return State(STALE, ("there is no executed notebook",))
+    return State(FRESH if done["prose"] == _prose(run.notebook) else PROSE)
+
+
+def read_runs(folder: Path) -> dict[str, Any]:
+    """Return what is remembered of the last run of each notebook, by name."""
+    try:
+        return dict(json.loads((folder / RUNS).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}
+
+
+def _remember(folder: Path, name: str, entry: Mapping[str, Any] | None) -> None:
+    """Write down a notebook's last run, or that there is none."""
+    runs = {key: value for key, value in read_runs(folder).items() if key != name}
+    if entry is not None:
+        runs[name] = entry
+    write_file(folder / RUNS, json.dumps(runs, indent=1, sort_keys=True) + "\n")
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+
+
+def _render(run: Run, folder: Path) -> None:
+    from replication.execution import render
+
+    name = run.notebook.name
+    render(run.notebook, folder / f"{name}.ipynb")
+    _remember(folder, name, {**read_runs(folder)[name], "prose": _prose(run.notebook)})
+
+
+def _prose(notebook: Notebook) -> str:
+    """Return the hash of all text of a notebook: what a reader of the executed one sees."""
+    return provenance.text_hash(json.dumps([cell.source for cell in notebook.node.cells]))
+
+
+def _commit() -> tuple[str, bool]:
+    """Return the project's commit, and whether nothing was changed since; empty without git."""
+    try:
+        said = [
+            subprocess.run(
+                ["git", *words],
+                cwd=paths.PROJECT,
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout.strip()
+            for words in (("rev-parse", "HEAD"), ("status", "--porcelain"))
+        ]
+    except (OSError, subprocess.CalledProcessError):
+        return "", False
+    return said[0], not said[1]
+
+
+@contextmanager
+def _exclusive(folder: Path, echo: Callable[[str], object]) -> Iterator[None]:
+    """Keep other runs out of a folder; wait for one that is there."""
+    with (folder / LOCK).open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            echo(f"another run writes to {folder}: waiting until it ends")
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+# --- what a run leaves -----------------------------------------------------------------------
 
 
 def _number(notebook: Notebook) -> str:
@@ -215,109 +414,10 @@ def _check_apart(notebooks: Sequence[Notebook]) -> None:
     for notebook in notebooks:
         for name in notebook.merged:
             if name in owners:
-                refuse(notebook.path, f"merges {name}, which {owners[name].path} overwrites")
-
-
-@contextmanager
-def _private_kernel(scratch: Path, *, progress: bool) -> Iterator[None]:
-    """Make the running interpreter the kernel, free of the user's own start-up files."""
-    spec = {
-        # its own warnings (that local sockets are not encrypted) are no concern of the user
-        "argv": [
-            *(sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"),
-            "--log-level=ERROR",
-        ],
-        "display_name": KERNEL,
-        "language": "python",
-        "env": {
-            "IPYTHONDIR": str(scratch / "ipython"),
-            "PYTHONSTARTUP": "",
-            "PYTHONHASHSEED": "0",  # sets keep their order from run to run
-            "REPLICATION_PROGRESS": str(int(progress)),
-        },
-    }
-    write_file(scratch / "jupyter" / "kernels" / KERNEL / "kernel.json", json.dumps(spec))
-    changed = {
-        "JUPYTER_PATH": os.pathsep.join(
-            filter(None, (str(scratch / "jupyter"), os.environ.get("JUPYTER_PATH")))
-        ),
-        "JUPYTER_RUNTIME_DIR": str(scratch / "runtime"),
-    }
-    before = {name: os.environ.get(name) for name in changed}
-    os.environ.update(changed)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _execute(
-    notebook: Notebook, values: Mapping[str, Any], draft: Path, timeout: int, progress: bool
-) -> None:
-    """Execute into the file `draft`, which is there after a failure too."""
-    begun: list[int] = []
-
-    def begin(cell: Any, cell_index: int) -> None:
-        begun.append(cell_index)
-
-    def place(at: int) -> str:
-        # papermill puts its own cell behind the parameters cell
-        return f"{notebook.path}: cell {at + 1 - (at > notebook.at)}"
-
-    for attempt in range(1, STARTS + 1):
-        try:
-            node = papermill.execute_notebook(
-                copy.deepcopy(notebook.node),
-                str(draft),
-                parameters=dict(values),
-                kernel_name=KERNEL,
-                language="python",
-                progress_bar=False,
-                stderr_file=sys.stderr if progress else None,
-                execution_timeout=timeout,
-                iopub_timeout=60,
-                shutdown_kernel="immediate",
-                record_timing=False,
-                on_cell_execute=begin,
-            )
-        except PapermillExecutionError as error:
-            said = first_line(error.evalue)
-            if error.ename in MISTAKES:
-                refuse(notebook.path, said + _example(notebook, values, said))
-            said = f"{error.ename}: {said}"
-            details = "\n".join(error.traceback)
-            raise RunError(f"{place(error.cell_index)} failed: {said}", details) from None
-        except Exception as error:
-            if not begun:
-                if attempt < STARTS:
-                    continue
-                said = f"the kernel does not start: {first_line(error)}"
-                raise RunError(f"{notebook.path}: {said}") from error
-            if isinstance(error, DeadKernelError):
-                why = "the kernel was killed, perhaps for want of memory; use fewer --jobs"
-                raise RunError(f"{place(begun[-1])}: {why}") from None
-            if isinstance(error, CellTimeoutError):
-                why = f"took more than {timeout} seconds; allow more with --timeout"
-                raise RunError(f"{place(begun[-1])} {why}") from None
-            raise RunError(f"{place(begun[-1])}: {first_line(error)}") from error
-        if node.cells[begun[-1]].metadata.papermill.exception:  # SystemExit, no error to papermill
-            raise RunError(f"{place(begun[-1])} ended the notebook before its last cell")
-        return
-
-
-def _example(notebook: Notebook, values: Mapping[str, Any], said: str) -> str:
-    """Show how to take the kinds that a file has, if it lacks one that was asked for."""
-    if "has no incorrect demo of kind" not in said or "choices" not in notebook.literals:
-        return ""
-    choices = {**values.get("choices", {}), "incorrect": "all"}
-    return f", such as -p choices {shlex.quote(json.dumps(choices))}"
-
-
-# --- what a run leaves -----------------------------------------------------------------------
+                refuse(
+                    notebook.path,
+                    f"merges {name}, which {owners[name].path} overwrites",
+                )
 
 
 def _copy_merged(notebook: Notebook, out: Path, stage: Path) -> dict[str, int]:
@@ -358,34 +458,3 @@ def _publish(notebook: Notebook, stage: Path, out: Path) -> list[Path]:
         for draft in drafts.values():
             draft.unlink(missing_ok=True)
     return list(drafts)
-
-
-def _clean(notebook: Notebook, draft: Path, stage: Path, out: Path) -> str:
-    """Return the executed notebook without what differs between equal runs."""
-    node = nbformat.read(draft, as_version=4)
-    node.metadata.pop("papermill", None)
-    known = {cell.get("id") for cell in notebook.node.cells}
-    for at, cell in enumerate(node.cells):
-        cell.metadata.pop("papermill", None)
-        if cell.id not in known:
-            cell.id = f"papermill-{at}"
-        if cell.cell_type == "code":
-            cell.outputs = _without_bars(cell.outputs)
-    text = str(nbformat.writes(node))
-    return text.replace(json.dumps(str(stage))[1:-1], json.dumps(str(out))[1:-1]) + "\n"
-
-
-def _without_bars(outputs: Sequence[Any]) -> list[Any]:
-    """Join what was written to stderr in pieces, and keep what a terminal would show of it."""
-    kept: list[Any] = []
-    for output in outputs:
-        stderr = output.output_type == "stream" and output.name == "stderr"
-        if stderr and kept and kept[-1].get("name") == "stderr":
-            kept[-1].text += output.text
-        else:
-            kept.append(output)
-    for output in kept:
-        if output.get("name") == "stderr":
-            lines = [line.rpartition("\r")[2] for line in output.text.split("\n")]
-            output.text = "\n".join(line for line in lines if not re.search(r"\d+%\|.*\|", line))
-    return [output for output in kept if output.get("name") != "stderr" or output.text.strip()]

@@ -249,10 +249,9 @@ def findings_at_once(
                 for value in part.sort_values("holds", ascending=False, kind="stable").itertuples()
                 if not np.isnan(value.holds)
             )
-            line += (
-                f". {one.choice} accounts for {one.share:.0%} of the variance of its effect; the "
-                f"claim holds with {by_value}"
-            )
+            line += f". {one.choice} accounts for {one.share:.0%} of the variance of its effect"
+            if row.holds:
+                line += f"; the claim holds with {by_value}"
         lines.append(f"{line}.")
     return lines
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,14 +24,39 @@ def source_hash(module: str) -> str:
     The data files beside the package's modules are not code and do not count.
     """
     digest = hashlib.sha256()
-    for name, tree in sorted(_closure(module).items()):
+    for name, tree in sorted(_closure([module]).items()):
         digest.update(f"{name}\n{ast.unparse(_bare(tree))}\n".encode())
     return digest.hexdigest()
 
 
-def _closure(module: str) -> dict[str, ast.Module]:
+def module_hashes(modules: Iterable[str]) -> dict[str, str]:
+    """Return the hash of each module of the package that some modules are or import, by name.
+
+    Names of other packages, and of what is no module, are passed over. The hashes are the first 16
+    digits of SHA-256.
+    """
+    own = [name for name in modules if name.split(".")[0] == PACKAGE and _is_module(name)]
+    found = {}
+    for name, tree in sorted(_closure(own).items()):
+        text = ast.unparse(_bare(tree))
+        found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return found
+
+
+def bare_source(text: str) -> str:
+    """Return Python source without docstrings, comments and layout.
+
+    Text that is not Python, such as a line magic, is returned as it is.
+    """
+    try:
+        return ast.unparse(_bare(ast.parse(text)))
+    except SyntaxError:
+        return text
+
+
+def _closure(modules: Iterable[str]) -> dict[str, ast.Module]:
     found: dict[str, ast.Module] = {}
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         name = waiting.pop()
         if name in found:

@@ -7,42 +7,61 @@ trials that it is computed together with, or on whether it was computed now or r
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-from collections.abc import Sequence
-from typing import Any
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import joblib
-import numba
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from replication.irl import Trial, run
-from replication.seeds import trial_seeds
+from replication.compute import TRACED_TRIAL, compute, trial_key
+from replication.irl import Trial
+from replication.progress import trial_meter
 from replication.setting import Setting
-from replication.source import source_hash
-from replication.store import Store
+from replication.store import DamagedTrialError, Store
 from replication.tasks import Task
 
-TRACED_TRIAL = 0
-"""The one trial of a setting that keeps every iteration, declared beforehand (FIG5-TRIAL)."""
+__all__ = ["TRACED_TRIAL", "Results", "WorkerError", "run_trials", "trial_key"]
+
+SCHEDULER = "REPLICATION_SCHEDULER"
+"""Environment variable with the address of a Dask scheduler that trials are sent to."""
+
+
+class WorkerError(RuntimeError):
+    """A worker computed something else than it was asked for; the message is one line."""
 
 
 class Results:
     """The trials of some settings, read from the store when they are asked for."""
 
-    def __init__(self, store: Store, settings: Sequence[Setting], trials: int, root: int) -> None:
+    def __init__(
+        self,
+        store: Store,
+        settings: Sequence[Setting],
+        trials: int,
+        root: int,
+        *,
+        traced: bool = True,
+    ) -> None:
         self._store = store
         self._root = root
+        self._traced = traced
         self.trials = trials
         self.settings = list(settings)
 
     def trial(self, setting: Setting, k: int, *, snapshots: bool = False) -> Trial:
-        """Return trial `k` of a setting."""
-        return self._store.get(trial_key(setting, self._root, k), snapshots=snapshots)
+        """Return trial `k` of a setting; one that was damaged in the store is computed again."""
+        key = trial_key(setting, self._root, k, traced=self._traced)
+        try:
+            return self._store.get(key, snapshots=snapshots)
+        except DamagedTrialError:
+            self._store.drop(key)
+            self._store.put(compute(setting.task, [(setting, k)], self._root, traced=self._traced))
+            return self._store.get(key, snapshots=snapshots)
 
     def errors(self, setting: Setting) -> NDArray[np.float64]:
         """Return d of every trial, `[trial, iteration]`; after its end a trial keeps its last d."""
@@ -86,6 +105,7 @@ def run_trials(
     store: Store,
     jobs: int = 1,
     progress: bool | None = None,
+    traced: bool = True,
     seed: int,
 ) -> Results:
     """Compute those trials that the store does not have yet, and return all of them.
@@ -99,17 +119,24 @@ def run_trials(
     store
         Where finished trials go, a chunk at a time.
     jobs
-        Worker processes.
+        Worker processes. Where the environment variable REPLICATION_SCHEDULER has the address of a
+        Dask scheduler, its workers compute instead.
     progress
-        Whether to draw a bar; None draws it on a terminal, or as REPLICATION_PROGRESS (0 or 1)
-        says, by which `replicate run` lets its own terminal decide.
+        Whether to report progress, see :func:`replication.progress.trial_meter`.
+    traced
+        Whether the traced trial of each setting keeps its snapshots, which take half a megabyte.
     seed
         Root seed.
+
+    Raises
+    ------
+    WorkerError
+        If a worker has other code, or other versions of numpy or numba, than this process.
     """
     settings = list({trial_key(setting, seed, 0): setting for setting in settings}.values())
     missing: dict[Task, list[tuple[Setting, int]]] = {}
     for setting in settings:
-        keys = {k: trial_key(setting, seed, k) for k in range(trials)}
+        keys = {k: trial_key(setting, seed, k, traced=traced) for k in range(trials)}
         known = store.known(keys.values())
         wanted = [(setting, k) for k, key in keys.items() if key not in known]
         missing.setdefault(setting.task, []).extend(wanted)
@@ -118,44 +145,50 @@ def run_trials(
         for task, wanted in missing.items()
         for at in range(0, len(wanted), task.together)
     ]
-    work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        joblib.delayed(_compute)(task, wanted, seed) for task, wanted in chunks
-    )
-    total = sum(len(wanted) for _, wanted in chunks)
-    if progress is None and "REPLICATION_PROGRESS" in os.environ:
-        progress = os.environ["REPLICATION_PROGRESS"] == "1"
-    disable = None if progress is None else not progress
-    with tqdm(total=total, unit="trial", disable=disable, leave=False) as bar:
-        steps = 0
-        for finished in work:
-            store.put((trial_key(setting, seed, k), trial) for setting, k, trial in finished)
-            steps += sum(trial.steps for _, _, trial in finished)
-            bar.update(len(finished))
-            elapsed = max(bar.format_dict["elapsed"], 1e-9)
-            bar.set_postfix_str(f"{steps / elapsed / 1e6:.0f} M steps/s")
-    return Results(store, settings, trials, seed)
-
-
-def _compute(
-    task: Task, wanted: list[tuple[Setting, int]], root: int
-) -> list[tuple[Setting, int, Trial]]:
-    """Compute trials of settings that share a task side by side; runs in a worker."""
-    seeds = trial_seeds(root, max(k for _, k in wanted) + 1)
-    loops = [setting.trial(seed=seeds[k], keep=k == TRACED_TRIAL) for setting, k in wanted]
-    return [(*wanted[at], trial) for at, trial in run(task, loops)]
-
-
-def trial_key(setting: Setting, root: int, k: int) -> str:
-    """Return the hash of all that determines a trial: demos, method, parameters, seed and code."""
-    params: dict[str, Any] = setting.params.values()
-    del params["incorrect"]  # the selected demonstrations stand for it
-    content = {
-        "demos": setting.selected_hash,
-        "method": setting.method,
-        "params": params,
-        "seed": [root, k],
-        "traced": k == TRACED_TRIAL,
-        "source": source_hash("replication.trials"),
-        "versions": {"numba": numba.__version__, "numpy": np.__version__},
+    expected = {
+        trial_key(setting, seed, k, traced=traced) for _, wanted in chunks for setting, k in wanted
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    if expected:
+        with _workers(jobs) as n, trial_meter(len(expected), progress) as report:
+            work = joblib.Parallel(n_jobs=n, return_as="generator_unordered")(
+                joblib.delayed(compute)(task, wanted, seed, traced=traced)
+                for task, wanted in chunks
+            )
+            for finished in work:
+                if not expected.issuperset(key for key, _ in finished):
+                    raise WorkerError(
+                        "a worker runs other code, or other versions of numpy or numba, than this "
+                        "process: install the same commit and environment.lock there"
+                    )
+                store.put(finished)
+                report(len(finished), sum(trial.steps for _, trial in finished))
+    return Results(store, settings, trials, seed, traced=traced)
+
+
+@contextmanager
+def _workers(jobs: int) -> Iterator[int]:
+    """Let joblib use the Dask scheduler that the environment names; yield the number of jobs."""
+    address = os.environ.get(SCHEDULER)
+    if not address:
+        config = {"backend": "loky", "initializer": _end_with, "initargs": (os.getpid(),)}
+        with joblib.parallel_config(**config):
+            yield jobs
+        return
+    from distributed import Client
+
+    with (
+        Client(address, set_as_default=False) as client,  # type: ignore[no-untyped-call]
+        joblib.parallel_config(backend="dask", client=client),
+    ):
+        yield -1
+
+
+def _end_with(parent: int) -> None:
+    """Let a worker end soon after the process that started it, even if that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

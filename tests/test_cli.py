@@ -62,6 +62,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     node.metadata["replication"] = {"outputs": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
     (tmp_path / "notebooks").mkdir()
     nbformat.write(node, tmp_path / "notebooks" / "toy.ipynb")
+    (tmp_path / "environment.lock").touch()
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     return tmp_path
 
@@ -85,7 +86,7 @@ def test_run_writes_shows_and_tells(project: Path) -> None:
     table = "| -4 | 'x=y' | 9 | 2 |"
     assert (project / "build" / "custom" / "seen.md").read_text() == table
     assert table in result.stdout
-    assert f"outputs (1): {project / 'build' / 'custom'}\n" in result.stdout
+    assert f"outputs (1 new): {project / 'build' / 'custom'}\n" in result.stdout
     assert str(project / "build" / "executed" / "custom") in result.stdout
     assert not (project / "figures").exists()
 
@@ -126,7 +127,7 @@ def test_tables_are_shown_by_their_names(project: Path) -> None:
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
     assert titles == [(name, name) for name in ("a.md", "a_sets.md", "b.md", "b_sets.md")]
-    assert "\noutputs (5): " in shown
+    assert "\noutputs (5 new): " in shown
     assert "claims" not in shown
 
 
@@ -171,7 +172,7 @@ def test_failing_cell_shows_its_traceback(project: Path) -> None:
     assert "\x1b" not in result.stderr
     last = result.stderr.splitlines()[-1]
     assert re.fullmatch(r"error: .*toy\.ipynb: cell 2 failed: ValueError: no trials", last)
-    assert list((project / "here").iterdir()) == []
+    assert [path.name for path in (project / "here").iterdir()] == [".lock"]
 
 
 def test_run_refuses_in_one_line(project: Path) -> None:
@@ -198,9 +199,10 @@ def test_refusal_in_a_cell_is_one_line(project: Path) -> None:
     """A file or choice that only the notebook sees to be wrong has no traceback, and code 2."""
     path = project / "notebooks" / "toy.ipynb"
     node = nbformat.read(path, as_version=4)
-    node.cells[1].source = "from replication import load_demos\nload_demos(name)"
+    node.cells[1].source = "from replication import load_demos\nload_demos('none.json')"
     nbformat.write(node, path)
-    result = replicate("run", "-p", "name", "none.json")
+    assert "none.json: cannot be read by toy: no such" in refused("run", "-p", "name", "none.json")
+    result = replicate("run")
     assert result.exit_code == 2
     line = r"error: .*toy\.ipynb: none\.json: cannot be read \(no such file or directory\)\n"
     assert re.fullmatch(line, result.stderr)
@@ -239,6 +241,7 @@ def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
     ]
     node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
     nbformat.write(node, tmp_path / "sleep.ipynb")
+    (tmp_path / "environment.lock").touch()
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     code = (
@@ -257,11 +260,81 @@ def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
     while process.poll() is None and not (pid.exists() and pid.read_text().endswith("\n")):
         time.sleep(0.05)
     process.send_signal(getattr(signal, name))
-    assert process.communicate()[1] == "error: interrupted\n"
+    told = process.communicate()[1]
+    assert re.fullmatch(r"error: interrupted; .* are kept, and the same command goes on.*\n", told)
     assert process.returncode == 130
     assert list(scratch.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)
+
+
+def test_what_is_fresh_is_not_run(project: Path) -> None:
+    """A second run says in under 3 s that there is nothing to do, without loading papermill."""
+    assert replicate("run").exit_code == 0
+    code = (
+        "import sys; from pathlib import Path; from replication import cli, paths\n"
+        f"paths.PROJECT = Path({str(project)!r}); cli.app(['run'], standalone_mode=False)\n"
+        "print(sorted({'papermill', 'nbclient', 'matplotlib'} & set(sys.modules)))"
+    )
+    began = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert time.monotonic() - began < 3
+    lines = done.stdout.splitlines()
+    assert lines[0] == "toy: fresh, nothing to do"
+    assert "outputs (0 new): " in done.stdout
+    assert lines[-1] == "[]"
+    assert "toy: running" in replicate("run", "--force").stdout
+
+
+# --- status, verify and clean ----------------------------------------------------------------
+
+
+def test_status_leads_from_missing_to_fresh(project: Path) -> None:
+    """The report names the command that brings everything up to date."""
+    shown = replicate("status").stdout
+    assert shown.startswith("toy: missing\n")
+    assert shown.endswith("to bring figures up to date: replicate run toy\n")
+    assert replicate("run", "toy").exit_code == 0
+    shown = replicate("status").stdout
+    assert re.match(r"toy: fresh \(\d+ s, just now\)\n    fresh    seen \.md\n", shown)
+    assert "toy: missing" in replicate("status", "--profile", "quick").stdout
+    (project / "figures" / "seen.md").write_text("mine")
+    shown = replicate("status").stdout
+    assert "toy: stale" in shown
+    assert "because seen.md is changed" in shown
+
+
+def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everything that is wrong has a line on stderr, and any of it makes the code 1."""
+    monkeypatch.setattr("replication.verification.PROJECT", project)
+    result = replicate("verify")
+    assert result.exit_code == 1
+    assert "provenance.json is missing" in result.stderr
+    assert replicate("run").exit_code == 0
+    result = replicate("verify")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.endswith("everything agrees\n")
+    (project / "figures" / "seen.md").write_text("mine")
+    (project / "environment.lock").write_text("numpy==0.1\n")
+    result = replicate("verify")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: seen.md is changed since toy made it\nerror: numpy ")
+    assert result.stdout.endswith("2 things do not agree\n")
+
+
+def test_clean_removes_what_no_notebook_declares(project: Path) -> None:
+    """Declared files, the manifest and folders stay; --dry-run removes nothing."""
+    assert replicate("run").exit_code == 0
+    (project / "figures" / "old.png").touch()
+    (project / "figures" / "folder").mkdir()
+    before = sorted((project / "figures").iterdir())
+    shown = replicate("clean", "--dry-run").stdout
+    assert shown == f"would remove {project / 'figures' / 'old.png'}\n"
+    assert sorted((project / "figures").iterdir()) == before
+    assert replicate("clean").stdout.startswith("removed ")
+    assert sorted((project / "figures").iterdir()) == [p for p in before if p.name != "old.png"]
+    assert replicate("clean").stdout == ""
+    assert "toy: fresh" in replicate("status").stdout
 
 
 # --- learn -----------------------------------------------------------------------------------

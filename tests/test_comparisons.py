@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from replication import Demos
+from replication import Demos, provenance
 from replication.choices import ChoiceError
 from replication.claims import claims, criteria_hash
 from replication.comparisons import (
@@ -24,6 +24,7 @@ from replication.comparisons import (
 from replication.measures import measure_trials
 from replication.paper import SOCCER_CURVES, TABLE_1, TABLE_2
 from replication.paths import PROJECT
+from replication.regenerate import prepare
 from replication.sensitivity import effects_table
 from replication.setting import Setting
 from replication.specifications import declared, maze_settings, single_specifications
@@ -222,11 +223,22 @@ def test_every_reading_of_adaboost_is_a_setting(small_demos: Demos) -> None:
 
 
 def test_figures_are_complete() -> None:
-    """Every output that the notebooks declare lies in figures/, and nothing else of theirs."""
+    """Every declared output lies in figures/, and nothing else does but the manifest."""
     import nbformat
 
-    declared = set()
+    declared = {"provenance.json"}
     for path in sorted(Path(PROJECT / "notebooks").glob("*.ipynb")):
         metadata = nbformat.read(path, as_version=4).metadata["replication"]
         declared |= {*metadata["outputs"], *metadata.get("merged", [])}
-    assert declared == {path.name for path in FIGURES.iterdir()}
+    assert declared == {path.name for path in FIGURES.iterdir()} - {".lock"}
+
+
+def test_figures_are_up_to_date() -> None:
+    """The published outputs are whole, and came from what stands in the project now."""
+    manifest = provenance.read_manifest(FIGURES)
+    runs = prepare(sorted((PROJECT / "notebooks").glob("*.ipynb")), profile="paper")
+    assert set(manifest) == {run.notebook.name for run in runs}
+    for run in runs:
+        entry = manifest[run.notebook.name]
+        assert provenance.changes(entry["inputs"], run.inputs) == [], run.notebook.name
+        assert provenance.damaged(FIGURES, entry) == {}

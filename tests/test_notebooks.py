@@ -72,6 +72,8 @@ def test_literals_are_read_with_comments_and_signs(write: Write) -> None:
         ({"outputs": [1]}, "1, which is not a plain file name"),
         ({"outputs": ["a.png", "a.png"]}, "'a.png' twice"),
         ({"outputs": "a.png"}, "'outputs' must be a list"),
+        ({"inputs": "a.toml"}, "'inputs' must be a list of files"),
+        ({"inputs": [1]}, "'inputs' must be a list of files"),
         ({"merge": ["a.csv"]}, "unknown declaration 'merge' (did you mean 'merged'?)"),
         ({"profiles": {"quick": 3}}, "'profiles' must hold an object"),
         ({"profiles": {"quick": {"trails": 3}}}, "(did you mean 'trials'?)"),
@@ -83,6 +85,14 @@ def test_declarations_are_checked(write: Write, declared: dict[str, Any], messag
     """A declaration that cannot be honoured is named and refused."""
     with pytest.raises(NotebookError, match=re.escape(message)):
         read_notebook(write(**declared))
+
+
+def test_declarations_are_read(write: Write) -> None:
+    """What is declared comes back; a merged file counts as an output, once."""
+    found = read_notebook(write(outputs=["a", "b"], merged=["b", "c"], inputs=["x/y.toml"]))
+    assert (found.outputs, found.merged) == (("a", "b", "c"), ("b", "c"))
+    assert (found.name, found.at, found.inputs) == ("toy", 1, ("x/y.toml",))
+    assert read_notebook(write()).inputs == ()
 
 
 @pytest.mark.parametrize(

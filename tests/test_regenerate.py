@@ -1,24 +1,28 @@
 """Notebooks that are run for their files: what is refused, what is published and what is not."""
 
 import errno
+import fcntl
 import json
 import os
 import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import papermill
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import Demos, paths, regenerate
-from replication.notebooks import NotebookError
-from replication.regenerate import RunError, run_notebooks
+from replication import Demos, execution, paths
+from replication.files import write_file
+from replication.notebooks import Notebook, NotebookError, RunError
+from replication.regenerate import read_runs, run_notebooks
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
@@ -69,6 +73,11 @@ def no_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.fail("a notebook was executed")
 
     monkeypatch.setattr(papermill, "execute_notebook", execute)
+
+
+def files(folder: Path) -> list[str]:
+    """Return the names of a folder's files but for the manifest and the lock."""
+    return sorted({path.name for path in folder.iterdir()} - {"provenance.json", ".lock"})
 
 
 # --- before anything runs --------------------------------------------------------------------
@@ -125,6 +134,7 @@ def test_quick_results_never_go_to_figures(
     """Only the profile `paper` may write to the project's figures, by whatever path."""
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     (tmp_path / "link").symlink_to(tmp_path / "figures")
+    (tmp_path / "environment.lock").touch()
     for folder in ("figures", "figures/../figures", "link", "figures/below"):
         with pytest.raises(NotebookError, match="holds the results of the profile 'paper'"):
             run(write(), profile="quick", out=tmp_path / folder)
@@ -135,6 +145,7 @@ def test_changed_results_never_go_to_figures(
 ) -> None:
     """What changes no result may be set in a run into the figures, anything else may not."""
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    (tmp_path / "environment.lock").touch()
     path = write("(folder / 'a').touch()", outputs=["a"], parameters=f"{PARAMETERS}\nstore = ''")
     assert run(path, parameters={"store": "x", "jobs": 1}) == [tmp_path / "figures" / "a"]
     for options, named in (
@@ -159,7 +170,7 @@ def test_run_publishes_what_is_declared(
 
     A foreign kernel of the same name, and the user's start-up files, take no part.
     """
-    foreign = tmp_path / "jupyter" / "kernels" / regenerate.KERNEL
+    foreign = tmp_path / "jupyter" / "kernels" / execution.KERNEL
     foreign.mkdir(parents=True)
     spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
     (foreign / "kernel.json").write_text(json.dumps(spec))
@@ -192,17 +203,18 @@ def test_run_publishes_what_is_declared(
     assert "1 output in" in lines[1]
     assert os.environ["JUPYTER_PATH"] == str(tmp_path / "jupyter")
 
-    executed = (tmp_path / "executed" / "custom" / "toy.ipynb").read_text()
+    executed = (tmp_path / "executed" / "toy.ipynb").read_text()
     node = nbformat.reads(executed, as_version=4)
     assert [output.text for output in node.cells[-1].outputs] == [
-        f"{tmp_path / 'figures'}\n",
+        "figures\n",
         "kept\n",
     ]
     assert "papermill" not in node.metadata
+    assert str(tmp_path) not in executed
     assert not re.search(r"scratch|\d\d:\d\d:\d\d", executed)
 
-    run(path, profile="quick", seed=5, parameters={"choices": choices})
-    assert (tmp_path / "executed" / "custom" / "toy.ipynb").read_text() == executed
+    run(path, profile="quick", seed=5, parameters={"choices": choices}, force=True)
+    assert (tmp_path / "executed" / "toy.ipynb").read_text() == executed
 
 
 def test_merged_file_is_there_when_the_notebook_starts(
@@ -249,23 +261,29 @@ def test_failure_leaves_earlier_outputs(
     with pytest.raises(RunError, match=message) as caught:
         run(path, timeout=2)
     assert earlier.read_text() == "earlier"
-    assert list(earlier.parent.iterdir()) == [earlier]
-    assert (tmp_path / "executed" / "paper" / "toy.ipynb").exists()
+    assert files(earlier.parent) == ["a.txt"]
+    assert (tmp_path / "executed" / "toy.ipynb").exists()
     assert ("KeyError" in caught.value.details) == ("KeyError" in code)
 
 
-@pytest.mark.parametrize("ename", sorted(regenerate.MISTAKES))
+@pytest.mark.parametrize("ename", sorted(execution.MISTAKES))
 def test_refusal_in_a_cell_is_the_users_mistake(
     write: Write, run: Run, tmp_path: Path, ename: str
 ) -> None:
     """What the package refuses in a cell is told as before a run, and nothing is published."""
-    module = {"ChoiceError": "choices", "DemoError": "demos", "MazeError": "envs"}[ename]
+    modules = {
+        "ChoiceError": "choices",
+        "ClaimError": "claims",
+        "DemoError": "demos",
+        "MazeError": "envs",
+    }
+    module = modules[ename]
     code = f"from replication.{module} import {ename}\nraise {ename}('wrong\\nmore')"
     path = write("(folder / 'a').touch()", code, outputs=["a"])
     with pytest.raises(NotebookError, match=r"toy\.ipynb: wrong$"):
         run(path)
-    assert list((tmp_path / "figures").iterdir()) == []
-    assert (tmp_path / "executed" / "paper" / "toy.ipynb").exists()
+    assert files(tmp_path / "figures") == []
+    assert (tmp_path / "executed" / "toy.ipynb").exists()
 
 
 def test_missing_kind_comes_with_a_mend(write: Write, run: Run, small_demos: Demos) -> None:
@@ -292,8 +310,8 @@ def test_first_failure_stops_the_rest(write: Write, run: Run, tmp_path: Path) ->
     outputs = {"one": ["1"], "two": [], "three": ["3"]}
     with pytest.raises(RunError, match=r"two\.ipynb: cell 4 failed: ZeroDivisionError"):
         run(*(write(code, name=name, outputs=outputs[name]) for name, code in cells.items()))
-    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["1"]
-    assert not (tmp_path / "executed" / "paper" / "three.ipynb").exists()
+    assert files(tmp_path / "figures") == ["1"]
+    assert not (tmp_path / "executed" / "three.ipynb").exists()
 
 
 def test_only_the_start_of_a_kernel_is_tried_again(
@@ -315,7 +333,7 @@ def test_only_the_start_of_a_kernel_is_tried_again(
     begun[:] = [False] * 2
     with pytest.raises(RunError, match="the kernel does not start: Kernel died"):
         run(write())
-    assert len(begun) == 2 + regenerate.STARTS
+    assert len(begun) == 2 + execution.STARTS
 
 
 def test_publishing_is_all_or_nothing(
@@ -335,15 +353,256 @@ def test_publishing_is_all_or_nothing(
     with pytest.raises(RunError, match=r"cannot publish.*No space left"):
         run(path)
     assert (tmp_path / "figures" / "a").read_text() == "earlier"
-    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["a"]
+    assert files(tmp_path / "figures") == ["a"]
 
 
-def test_progress_bars_leave_only_what_a_terminal_would_show() -> None:
-    """Pieces of stderr are joined, redrawn lines keep their last state, bars are dropped."""
-    pieces = ["\r 10%|#   | 1/10", "\r100%|####| 10/10 [00:01]\n", "\rone", "\rtwo\n", "three\n"]
-    outputs = [new_output("stream", name="stderr", text=text) for text in pieces]
-    outputs.insert(0, new_output("stream", name="stdout", text="\r50%|# |"))
-    kept = regenerate._without_bars(outputs)
-    assert [output.text for output in kept] == ["\r50%|# |", "two\nthree\n"]
-    bar = new_output("stream", name="stderr", text="\r 10%|#   | 1/10\r             \r")
-    assert not regenerate._without_bars([bar])
+# --- what is executed again ------------------------------------------------------------------
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Run notebooks in this process, which is fast; return the names of those that began."""
+    begun: list[str] = []
+
+    def execute(
+        notebook: Notebook, values: Mapping[str, Any], stage: Path, *, executed: Path, **_: Any
+    ) -> None:
+        begun.append(notebook.name)
+        names: dict[str, Any] = {}
+        for at, cell in enumerate(notebook.node.cells):
+            if cell.cell_type == "code":
+                cell.execution_count = len(begun)
+                exec(cell.source, names)
+            if at == notebook.at:
+                names |= {**values, "out": str(stage)}
+        write_file(executed, str(nbformat.writes(notebook.node)))
+
+    monkeypatch.setattr(execution, "execute", execute)
+    return begun
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Set up a project with a lock and a data file."""
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    (tmp_path / "environment.lock").write_text("numpy==1")
+    (tmp_path / "data.toml").write_text("a = 1")
+    return tmp_path
+
+
+STORED = PARAMETERS + '\nstore = "build/trials.sqlite"'
+
+
+def toy(write: Write, code: str = "value = trials", **options: Any) -> Path:
+    """Write a notebook with two outputs and a data file."""
+    last = "[(folder / f'{name}.txt').write_text(f'{value}') for name in 'ab']"
+    declared = {"outputs": ["a.txt", "b.txt"], "inputs": ["data.toml"]}
+    return write(code, last, **declared | {"parameters": STORED} | options)
+
+
+def test_nothing_runs_when_nothing_has_changed(
+    write: Write, run: Run, project: Path, no_kernel: None, begun: list[str]
+) -> None:
+    """A second run executes nothing, publishes nothing, writes no file and says so."""
+    run(toy(write))
+    assert begun == ["toy"]
+    written = [project / "figures" / name for name in ("a.txt", "b.txt", "provenance.json")]
+    written += [project / "executed" / name for name in ("toy.ipynb", "run.json")]
+    times = [path.stat().st_mtime_ns for path in written]
+    lines: list[str] = []
+    assert run(toy(write), parameters={"store": "x"}, jobs=3, echo=lines.append) == []
+    assert begun == ["toy"]
+    assert lines == ["toy: fresh, nothing to do"]
+    assert [path.stat().st_mtime_ns for path in written] == times
+
+
+@pytest.mark.parametrize(
+    "change", ["cell", "literal", "data", "lock", "deleted", "edited", "executed", "runs"]
+)
+def test_a_change_that_matters_executes_again(
+    write: Write, run: Run, project: Path, begun: list[str], change: str
+) -> None:
+    """Code, parameters, data, lock, outputs and executed notebook count; then all is fresh."""
+    path = toy(write)
+    figures, executed = project / "figures", project / "executed"
+    run(path)
+    if change == "cell":
+        path = toy(write, "value = trials + 1")
+    elif change == "literal":
+        path = toy(write, parameters=STORED.replace("trials = 3", "trials = 4"))
+    elif change == "data":
+        (project / "data.toml").write_text("a = 2")
+    elif change == "lock":
+        (project / "environment.lock").write_text("numpy==2")
+    elif change == "deleted":
+        (figures / "a.txt").unlink()
+    elif change == "edited":
+        (figures / "a.txt").write_text("mine")
+    elif change == "executed":
+        (executed / "toy.ipynb").unlink()
+    elif change == "runs":
+        (executed / "run.json").write_text("[1]")
+    published = run(path)
+    assert begun == ["toy", "toy"]
+    assert [path.name for path in published] == ["a.txt", "b.txt"]
+    due = {"cell": "4", "literal": "4"}.get(change, "3")
+    assert [path.read_text() for path in published] == [due, due]
+    run(path)
+    assert begun == ["toy", "toy"]
+
+
+def test_cells_that_move_across_the_parameters_cell_count(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """The same cells in another order around the parameters cell are another notebook."""
+    path = toy(write, "value = 5")
+    run(path)
+    node = nbformat.read(path, as_version=4)
+    node.cells.insert(1, node.cells.pop(3))
+    nbformat.write(node, path)
+    run(path)
+    assert begun == ["toy", "toy"]
+
+
+def test_a_cell_that_is_cut_before_a_function_counts(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """Cells are compared one by one, because each has outputs of its own."""
+    run(toy(write, "value = 5\n\n\ndef unused(): pass"))
+    path = toy(write, "value = 5")
+    node = nbformat.read(path, as_version=4)
+    node.cells.insert(4, new_code_cell("def unused(): pass"))
+    nbformat.write(node, path)
+    run(path)
+    assert begun == ["toy", "toy"]
+
+
+def test_other_parameters_of_a_run_execute_again(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """Another seed, profile or -p is another run of the same folder, and going back is, too."""
+    path, out = toy(write, profiles={"quick": {"trials": 2}}), project / "build"
+    for options in ({}, {"seed": 2}, {"profile": "quick"}, {"parameters": {"alpha": 0.1}}, {}):
+        run(path, out=out, **options)
+        run(path, out=out, **options)
+    assert begun == ["toy"] * 5
+
+
+def test_prose_is_rendered_and_not_executed(
+    write: Write, run: Run, project: Path, no_kernel: None, begun: list[str]
+) -> None:
+    """New text, comments and layout come into the executed notebook; the outputs stay."""
+    path = toy(write)
+    run(path)
+    node = nbformat.read(path, as_version=4)
+    node.cells[0].source = "# Another headline"
+    node.cells[3].source = "value = (trials)  # as given"
+    node.cells.append(new_markdown_cell("The end"))
+    nbformat.write(node, path)
+    before = (project / "figures" / "a.txt").stat().st_mtime_ns
+    lines: list[str] = []
+    assert run(path, echo=lines.append) == []
+    assert lines == ["toy: fresh; its text is brought up to date, nothing is executed"]
+    assert begun == ["toy"]
+    assert (project / "figures" / "a.txt").stat().st_mtime_ns == before
+    shown = nbformat.read(project / "executed" / "toy.ipynb", as_version=4)
+    assert [cell.source for cell in shown.cells] == [cell.source for cell in node.cells]
+    assert shown.cells[3].execution_count == 1
+    run(path, echo=lines.append)
+    assert lines[-1] == "toy: fresh, nothing to do"
+
+
+def test_force_runs_what_is_fresh_with_an_empty_store(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """--force executes again, and gives the notebook a store that has nothing."""
+    path = toy(write, "value = Path(store).exists(), store == str(Path(store).absolute())")
+    (project / "build").mkdir()
+    (project / "build" / "trials.sqlite").touch()
+    assert run(path)[0].read_text() == "(True, True)"
+    assert run(path, force=True)[0].read_text() == "(False, True)"
+    assert begun == ["toy"] * 2
+    assert [one.name for one in (project / "build").iterdir()] == ["trials.sqlite"]
+
+
+def test_a_failure_forgets_the_run(
+    write: Write, run: Run, project: Path, begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a forced run that failed, the executed notebook is not that of the outputs."""
+    path = toy(write, "import os\nvalue = 1 // int(os.environ['DIVISOR'])")
+    monkeypatch.setenv("DIVISOR", "1")
+    run(path)
+    monkeypatch.setenv("DIVISOR", "0")
+    with pytest.raises(ZeroDivisionError):
+        run(path, force=True)
+    assert read_runs(project / "executed") == {}
+    monkeypatch.setenv("DIVISOR", "1")
+    run(path)
+    assert begun == ["toy"] * 3
+    assert list(read_runs(project / "executed")) == ["toy"]
+
+
+def test_only_what_changed_runs(write: Write, run: Run, project: Path, begun: list[str]) -> None:
+    """Of several notebooks, one that is fresh is left alone, also when a shared file is merged."""
+    append = "with (folder / 'rows.csv').open('a') as file: print(name, file=file)"
+
+    def both(code: str = "") -> list[Path]:
+        return [
+            write(append, text, name=name, parameters=f'out = "x"\nname = "{name}"', merged=shared)
+            for name, text in (("one", ""), ("two", code))
+        ]
+
+    shared = ["rows.csv"]
+    run(*both(), jobs=None)
+    run(*both("more = 1"), jobs=None)
+    run(*both("more = 1"), jobs=None)
+    assert begun == ["one", "two", "two"]
+
+
+# --- two runs at once ------------------------------------------------------------------------
+
+
+def test_a_second_run_says_that_it_waits(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """While another process has the folder, nothing begins, and one line says why."""
+    path, lines = toy(write), list[str]()
+    (project / "figures").mkdir()
+    with (project / "figures" / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        second = threading.Thread(target=run, args=(path,), kwargs={"echo": lines.append})
+        second.start()
+        while not lines:
+            time.sleep(0.01)
+        time.sleep(0.1)
+        assert lines == [f"another run writes to {project / 'figures'}: waiting until it ends"]
+        assert begun == []
+    second.join(timeout=60)
+    assert begun == ["toy"]
+    assert files(project / "figures") == ["a.txt", "b.txt"]
+
+
+def test_runs_at_the_same_time_leave_whole_outputs(
+    write: Write, run: Run, project: Path, begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs of different parameters take turns: the outputs are all of one of them."""
+    path = toy(write, "import time; time.sleep(0.3); value = seed")
+    options: dict[str, Any] = {"profile": "paper", "out": project / "build" / "custom"}
+    lines: list[str] = []
+    threads = [
+        threading.Thread(
+            target=run_notebooks,
+            args=([path],),
+            kwargs=options | {"seed": seed, "echo": lines.append},
+        )
+        for seed in (1, 2, 3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=60)
+    assert begun == ["toy"] * 3
+    assert sum("waiting until it ends" in line for line in lines) == 2
+    texts = {(project / "build" / "custom" / f"{name}.txt").read_text() for name in "ab"}
+    assert len(texts) == 1
+    assert run_notebooks([path], seed=int(texts.pop()), **options) == []

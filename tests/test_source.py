@@ -106,9 +106,33 @@ def test_a_text_that_is_a_value_counts(toy: Callable[..., str]) -> None:
     )
 
 
+def test_each_module_has_a_hash_of_its_own(toy: Callable[..., str], tmp_path: Path) -> None:
+    """The hashes name the module whose code changed, and no other package's modules."""
+    before = source.module_hashes(["toy.top", "toy.no_module", "numpy", "nowhere.at_all"])
+    assert list(before) == ["toy.bottom", "toy.middle", "toy.top"]
+    assert source.module_hashes(["toy.top"]) == before
+    (tmp_path / "toy" / "bottom.py").write_text("FACTOR = 3  # three")
+    after = source.module_hashes(["toy.top"])
+    assert [name for name in after if after[name] != before[name]] == ["toy.bottom"]
+
+
+@pytest.mark.parametrize(
+    ("text", "bare"),
+    [
+        ("x=1 # one", "x = 1"),
+        ('"""Prose."""\nx = (1)', "x = 1"),
+        ("%matplotlib inline # so", "%matplotlib inline # so"),
+        ("x = 'a' # b", "x = 'a'"),
+    ],
+)
+def test_bare_source_has_no_prose(text: str, bare: str) -> None:
+    """Cells lose comments, layout and lone texts; what is not Python stays as it is."""
+    assert source.bare_source(text) == bare
+
+
 @pytest.fixture
 def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """Return the names of the modules that are read for the hash of `replication.trials`."""
+    """Return the names of the modules that are read for the hash of `replication.compute`."""
     read: set[str] = set()
     whole = Path.read_bytes
 
@@ -117,27 +141,30 @@ def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
         return whole(self)
 
     monkeypatch.setattr(Path, "read_bytes", noted)
-    source.source_hash.__wrapped__("replication.trials")
+    source.source_hash.__wrapped__("replication.compute")
     return read
 
 
 def test_drawing_and_reporting_do_not_count(hashed_files: set[str]) -> None:
     """A trial's hash covers what computes it, and neither figures nor tables nor the program."""
-    for name in ("trials", "setting", "qlearning", "expectations", "irl.loop", "irl.unified"):
+    for name in ("compute", "setting", "qlearning", "expectations", "irl.loop", "irl.unified"):
         assert f"replication.{name}" in hashed_files
-    for name in ("figures", "panels", "tables", "outputs", "statistics", "regenerate", "cli"):
+    for name in (
+        *("figures", "panels", "tables", "outputs", "statistics", "regenerate", "cli"),
+        *("trials", "store", "progress", "execution", "provenance"),
+    ):
         assert (PROJECT / "replication" / f"{name}.py").exists()
         assert f"replication.{name}" not in hashed_files
 
 
 def test_hash_covers_all_that_python_loads(hashed_files: set[str]) -> None:
-    """Each module of the package that Python loads for `replication.trials` is in the hash."""
+    """Each module of the package that Python loads for `replication.compute` is in the hash."""
     program = f"""
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 spec = spec_from_file_location("replication", {str(PROJECT / "replication" / "__init__.py")!r})
 sys.modules["replication"] = module_from_spec(spec)  # its own imports are not executed
-import replication.trials
+import replication.compute
 loaded = [name for name in sys.modules if name.startswith("replication.")]
 print(*(name for name in loaded if not hasattr(sys.modules[name], "__path__")))
 """
@@ -159,6 +186,6 @@ def test_no_module_hides_its_imports() -> None:
 
 def test_hash_is_the_same_again() -> None:
     """The hash does not depend on the order in which modules are found."""
-    again = source.source_hash.__wrapped__("replication.trials")
-    assert again == source.source_hash("replication.trials")
+    again = source.source_hash.__wrapped__("replication.compute")
+    assert again == source.source_hash("replication.compute")
     assert len(again) == 64

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 import signal
 import sqlite3
 import subprocess
@@ -15,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replication.irl import Snapshots, Trial
-from replication.store import Store
+from replication.store import DamagedTrialError, Store
 from replication.tasks import Episode
 
 FLOATS = st.floats(width=64)
@@ -184,6 +185,70 @@ def test_other_threads_may_read_and_write(store_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert Store(store_path).known(keys) == set(keys)
+
+
+def test_a_damaged_trial_is_never_taken_for_a_good_one(store_path: Path) -> None:
+    """Whichever bit of a record is wrong, or missing, it is told or does not matter."""
+    store = Store(store_path)
+    store.put([("a", trial([1.0, 2.0], 1)), ("b", trial([3.0], 1))])
+    connection = sqlite3.connect(store_path)
+    (record,) = connection.execute("SELECT record FROM trials WHERE key = 'a'").fetchone()
+    damages = [record[:at] for at in range(0, len(record), 5)]
+    damages += [
+        record[:at] + bytes([record[at] ^ bit]) + record[at + 1 :]
+        for at in range(len(record))
+        for bit in (1, 16, 128)
+    ]
+    told = 0
+    for damage in damages:
+        connection.execute("UPDATE trials SET record = ? WHERE key = 'a'", (damage,))
+        connection.commit()
+        try:
+            assert_same(store.get("a"), trial([1.0, 2.0], 1))  # a bit that fills the last byte
+        except DamagedTrialError:
+            told += 1
+    connection.close()
+    assert told > 0.95 * len(damages)
+    store.drop("a")
+    assert "a" not in store
+    store.put([("a", trial([4.0], 1))])
+    assert [store.get(key).errors.tolist() for key in "ab"] == [[4.0], [3.0]]
+
+
+@pytest.mark.parametrize("content", [b"no database, but as long as its header" * 9, b"\1" * 99])
+def test_a_damaged_file_is_set_aside(
+    store_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file that is no store is kept under another name, told, and a new one begun."""
+    store_path.parent.mkdir()
+    for number in (1, 2):
+        store_path.write_bytes(content)
+        store = Store(store_path)
+        store.put([("a", trial([1.0], 1))])
+        assert "a" in store
+        store._connection.close()
+        aside = store_path.with_name(f"trials.sqlite.damaged-{number}")
+        assert aside.read_bytes() == content
+        assert f"set aside as {aside.name}" in capsys.readouterr().err
+
+
+def test_a_store_that_cannot_be_used_is_an_error(tmp_path: Path) -> None:
+    """A folder in the place of the file is told, and not set aside."""
+    with pytest.raises(OSError, match="the store cannot be used"):
+        Store(tmp_path)
+    assert tmp_path.is_dir()
+
+
+def test_one_store_serves_threads(store_path: Path) -> None:
+    """Each thread has a connection of its own, and so has a copy."""
+    store = Store(store_path)
+    store.put([("a", trial([1.0], 1))])
+    found: list[bool] = []
+    thread = threading.Thread(target=lambda: found.append("a" in store))
+    thread.start()
+    thread.join()
+    assert found == [True]
+    assert "a" in pickle.loads(pickle.dumps(store))
 
 
 def child(program: str, path: Path) -> subprocess.Popen[str]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import pandas as pd
 import pytest
 
 from replication import Demos
-from replication import trials as trials_module
+from replication import compute as compute_module
 from replication.demos import content_hash
 from replication.irl import Trial, run
 from replication.params import Params
@@ -18,7 +19,7 @@ from replication.seeds import trial_seeds
 from replication.setting import Setting
 from replication.store import Store
 from replication.tasks import Task
-from replication.trials import TRACED_TRIAL, Results, run_trials, trial_key
+from replication.trials import TRACED_TRIAL, Results, WorkerError, run_trials, trial_key
 
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
 
@@ -73,7 +74,7 @@ def test_settings_that_share_a_task_are_computed_together(
         chunks.append(len(loops))
         return run(task, loops)
 
-    monkeypatch.setattr(trials_module, "run", spy)
+    monkeypatch.setattr(compute_module, "run", spy)
     together = run_trials(settings, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
     assert chunks == [3 * len(settings)]
     for number, setting in enumerate(settings):
@@ -99,7 +100,7 @@ def test_settings_of_other_tasks_are_computed_apart(
         tasks.append(task)
         return run(task, loops)
 
-    monkeypatch.setattr(trials_module, "run", spy)
+    monkeypatch.setattr(compute_module, "run", spy)
     run_trials(settings, trials=2, store=Store(store_path), seed=5)
     assert tasks == [setting.task for setting in settings]
 
@@ -222,6 +223,60 @@ def test_equal_settings_are_run_once(small_demos: Demos, store_path: Path) -> No
     setting = Setting(small_demos, "unified", Params.of(**FEW))
     results = run_trials([setting, setting], trials=2, store=Store(store_path), seed=1)
     assert len(results.frame()) == 2
+
+
+def test_a_damaged_trial_is_computed_again(small_demos: Demos, store_path: Path) -> None:
+    """What cannot be read from the store is replaced by the same bits."""
+    results = _run(small_demos, store_path, trials=2)
+    due = _bits(results)
+    connection = sqlite3.connect(store_path)
+    with connection:
+        connection.execute("UPDATE trials SET record = substr(record, 1, 40)")
+    connection.close()
+    assert _bits(results) == due
+    assert _bits(_run(small_demos, store_path, trials=2)) == due
+
+
+def test_a_killed_run_goes_on_from_the_store(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a run that broke off had finished is not computed again."""
+    settings = [
+        Setting(small_demos, "unified", Params.of(**FEW, ties=ties)) for ties in ("random", "first")
+    ]
+    computed: list[int] = []
+    put = Store.put
+
+    def fail(self: Store, trials: list[tuple[str, Trial]]) -> None:
+        if computed:
+            raise KeyboardInterrupt
+        computed.append(len(trials))
+        put(self, trials)
+
+    monkeypatch.setattr(Store, "put", fail)
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(settings, trials=2, store=Store(store_path), seed=5)
+    monkeypatch.setattr(Store, "put", put)
+
+    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+        computed.append(len(loops))
+        return run(task, loops)
+
+    monkeypatch.setattr(compute_module, "run", spy)
+    run_trials(settings, trials=2, store=Store(store_path), seed=5)
+    assert computed == [2, 2]
+
+
+def test_a_worker_with_other_code_is_refused(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Trials whose keys nobody asked for are not stored."""
+    setting = Setting(small_demos, "unified", Params.of(**FEW))
+    key = trial_key(setting, 5, 0)
+    monkeypatch.setattr(compute_module, "trial_key", lambda *_, **__: "other")
+    with pytest.raises(WorkerError, match=r"environment\.lock"):
+        run_trials([setting], trials=1, store=Store(store_path), seed=5)
+    assert not Store(store_path).known(["other", key])
 
 
 def test_trial_seeds_are_the_children_of_the_root() -> None:

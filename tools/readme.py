@@ -39,8 +39,20 @@ def results() -> str:
 
 
 def _holding(outcomes: pd.DataFrame, id: str) -> str:
-    """Say in how many specifications a claim holds: of all choices at once, or one at a time."""
-    own = outcomes[outcomes["claim"] == id].set_index("group")
+    """Say in how many specifications a claim holds: of all choices at once, or one at a time.
+
+    Those of the mazes are on several maps, and stand for the same claim on another maze as well.
+    """
+    claim, tested = claims().by_id(id), set(outcomes["claim"])
+    same = [
+        one.id
+        for one in claims().claim
+        if one.id in tested
+        and (one.measure, one.statistic, one.x, one.y)
+        == (claim.measure, claim.statistic, claim.x, claim.y)
+        and (one.task == "soccer") == (claim.task == "soccer")
+    ]
+    own = outcomes[outcomes["claim"].isin(same)].set_index("group")
     for group in ("factorial", "single"):
         if group in own.index:
             row = own.loc[group]

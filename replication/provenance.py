@@ -1,0 +1,194 @@
+"""What outputs came from: a manifest beside them, and what has changed since.
+
+The manifest `provenance.json` is the same for identical runs. For each notebook it holds the hashes
+of everything that the outputs depend on, and of the outputs. What differs from run to run, such as
+times, goes into `run.json` beside the executed notebooks.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.metadata
+import json
+import platform
+import sys
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from replication import paths
+from replication.files import write_file
+from replication.notebooks import Notebook, NotebookError
+from replication.source import bare_source, module_hashes
+
+MANIFEST = "provenance.json"
+FORMAT, VERSION = "replication-provenance", 1
+
+NEUTRAL = frozenset({"jobs", "store", "out"})
+"""Parameters that leave every result as it is."""
+
+REPORTED = ("matplotlib", "numba", "numpy", "pandas", "pymunk", "scipy")
+"""Packages whose versions are named in the manifest; the lock's hash covers all."""
+
+Inputs = dict[str, Any]
+
+
+def inputs_of(notebook: Notebook, values: Mapping[str, Any]) -> Inputs:
+    """Return everything that a notebook's outputs depend on, as names and hashes.
+
+    Prose does not count: not that of the notebook, nor docstrings and comments of the package.
+
+    Parameters
+    ----------
+    notebook
+        The notebook.
+    values
+        Parameters of the run that differ from the notebook's literals.
+
+    Raises
+    ------
+    NotebookError
+        If a file that the notebook reads does not exist.
+    """
+    cells = [  # the parameters cell keeps its place among them
+        "" if at == notebook.at else cell.source
+        for at, cell in enumerate(notebook.node.cells)
+        if cell.cell_type == "code"
+    ]
+    parameters = {**notebook.literals, **values}
+    files = [paths.PROJECT / name for name in notebook.inputs]
+    for value in parameters.values():
+        if isinstance(value, str) and value.endswith(".json"):
+            files.append(paths.resolve(value))
+    data = {}
+    for file in files:
+        try:
+            data[_name(file)] = _data_hash(file)
+        except OSError as error:
+            said = (error.strerror or str(error)).lower()
+            raise NotebookError(f"{file}: cannot be read by {notebook.name}: {said}") from None
+    return {
+        "cells": text_hash(json.dumps([bare_source(cell) for cell in cells])),
+        "parameters": {k: v for k, v in sorted(parameters.items()) if k not in NEUTRAL},
+        "outputs": sorted(notebook.outputs),
+        "source": module_hashes(_imported(cells)),
+        "data": dict(sorted(data.items())),
+        "lock": file_hash(paths.PROJECT / "environment.lock"),
+    }
+
+
+def changes(before: Inputs, now: Inputs) -> list[str]:
+    """Say what differs between the inputs of a run and those of now."""
+    found = []
+    for key, what in (("parameters", "parameter "), ("data", ""), ("source", "")):
+        old, new = before.get(key, {}), now[key]
+        names = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
+        found += [f"{what}{name} has changed" for name in names]
+    labels = {
+        "cells": "the notebook's code has changed",
+        "outputs": "the notebook declares other outputs",
+        "lock": "environment.lock has changed",
+    }
+    return found + [label for key, label in labels.items() if before.get(key) != now[key]]
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return what the manifest of a folder says of each notebook; empty if there is none.
+
+    A manifest that cannot be read counts as none: its outputs are then made again.
+    """
+    try:
+        document = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if (document["format"], document["version"]) == (FORMAT, VERSION):
+            return dict(document["notebooks"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return {}
+
+
+def record(folder: Path, notebook: Notebook, inputs: Inputs) -> None:
+    """Enter a finished run into the manifest of the folder that holds its outputs."""
+    notebooks = read_manifest(folder)
+    outputs = {name: file_hash(folder / name) for name in sorted(notebook.outputs)}
+    notebooks[notebook.name] = {
+        "inputs": inputs,
+        "outputs": outputs,
+        "versions": versions(),
+    }
+    for other in notebooks.values():  # a shared file has changed for all that share it
+        shared = other["outputs"].keys() & set(notebook.merged)
+        other["outputs"].update({name: outputs[name] for name in shared})
+    document = {"format": FORMAT, "version": VERSION, "notebooks": notebooks}
+    text = json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False)
+    write_file(folder / MANIFEST, text + "\n")
+
+
+def versions() -> dict[str, str]:
+    """Return what a run ran on, in neutral words."""
+    found = {name: importlib.metadata.version(name) for name in REPORTED}
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return {
+        "python": python,
+        "platform": f"{platform.system()} {platform.machine()}",
+        **found,
+    }
+
+
+def damaged(folder: Path, entry: Mapping[str, Any]) -> dict[str, str]:
+    """Return the outputs of a manifest's entry that are "missing" or "changed" since the run."""
+    found = {}
+    for name, due in entry["outputs"].items():
+        path = folder / name
+        if not path.is_file():
+            found[name] = "missing"
+        elif file_hash(path) != due:
+            found[name] = "changed"
+    return found
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def text_hash(text: str) -> str:
+    """Return the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _data_hash(path: Path) -> str:
+    """Return the hash of what a data file says: of TOML and JSON without their layout."""
+    content = path.read_bytes()
+    try:
+        if path.suffix == ".toml":
+            document = tomllib.loads(content.decode())
+            return text_hash(json.dumps(document, sort_keys=True, default=str))
+        if path.suffix == ".json":
+            return text_hash(json.dumps(json.loads(content), sort_keys=True))
+    except ValueError:
+        pass  # whoever reads it will say what is wrong
+    return hashlib.sha256(content).hexdigest()
+
+
+def _imported(cells: list[str]) -> list[str]:
+    """Return the names of what some cells import."""
+    names = []
+    for cell in cells:
+        try:
+            tree = ast.parse(cell)
+        except SyntaxError:  # its run will say so
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                names += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names.append(node.module)
+                names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
+
+
+def _name(path: Path) -> str:
+    inside = path.resolve().is_relative_to(paths.PROJECT)
+    return path.resolve().relative_to(paths.PROJECT).as_posix() if inside else path.name

@@ -1,0 +1,153 @@
+"""Prove published results: the files, the environment, and a sample of the trials, recomputed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from importlib import metadata
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from replication import provenance
+from replication.choices import Value, register
+from replication.comparisons import EXPERIMENTS
+from replication.compute import compute, trial_key
+from replication.demos import load_demos
+from replication.irl import Trial
+from replication.params import Params
+from replication.paths import PROJECT, resolve
+from replication.setting import Setting
+from replication.store import DamagedTrialError, Store
+
+EVERY = 20
+"""One trial in so many is recomputed: 5 %."""
+
+
+def verify_outputs(out: Path) -> Iterator[str]:
+    """Yield what is wrong with the outputs of a folder, held against its manifest."""
+    manifest = provenance.read_manifest(out)
+    if not manifest:
+        yield f"{out / provenance.MANIFEST} is missing or cannot be read: nothing can be proved"
+    for name, entry in manifest.items():
+        for output, how in provenance.damaged(out, entry).items():
+            yield f"{output} is {how} since {name} made it"
+
+
+def verify_packages(lock: Path) -> Iterator[str]:
+    """Yield how the installed packages differ from those that are pinned in a lock file."""
+    for line in lock.read_text(encoding="utf-8").splitlines():
+        if not re.match(r"[A-Za-z0-9]", line):
+            continue
+        pin = Requirement(line.split("\\")[0].strip())
+        if pin.marker is not None and not pin.marker.evaluate():
+            continue
+        name = canonicalize_name(pin.name)
+        try:
+            installed = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            yield f"{name} is not installed; the lock pins {pin.specifier}"
+            continue
+        if not pin.specifier.contains(installed, prereleases=True):
+            yield f"{name} {installed} is installed; the lock pins {pin.specifier}"
+
+
+def verify_trials(
+    out: Path,
+    store: Path,
+    *,
+    jobs: int = 1,
+    report: Callable[[int], object] = lambda _: None,
+) -> Iterator[str]:
+    """Recompute every 20th trial of trials.csv from nothing, and yield what differs.
+
+    A trial's number of iterations and of learning steps is held against the file, and every bit of
+    it against the store where that has it.
+
+    Parameters
+    ----------
+    out
+        Folder with trials.csv.
+    store
+        The store's file; it need not exist.
+    jobs
+        Worker processes.
+    report
+        Told how many trials are recomputed.
+    """
+    sample = sampled_trials(out)
+    report(len(sample))
+    stored = Store(store) if store.exists() else None
+    rows = []
+    for row in sample.itertuples():
+        try:
+            rows.append((setting_of(row.task, row.method, row.choices), row))
+        except (ValueError, KeyError, IndexError) as error:
+            yield f"trials.csv: {row.task}, {row.method}, {row.choices}: no such setting: {error}"
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
+        joblib.delayed(compute)(setting.task, [(setting, row.trial)], row.seed)
+        for setting, row in rows
+    )
+    for (setting, row), ((key, trial),) in zip(rows, work, strict=True):
+        name = f"{row.task}, {row.method}, {row.choices or 'defaults'}, trial {row.trial}"
+        ours = (trial.iterations, trial.converged, trial.steps)
+        if ours != (row.iterations, row.converged, row.steps):
+            yield f"trials.csv: {name}: {ours[0]} iterations and {ours[2]} steps, not those there"
+        assert key == trial_key(setting, row.seed, row.trial), "a trial has one key"
+        if stored is None or key not in stored:
+            continue
+        try:
+            same = same_bits(trial, stored.get(key))
+        except DamagedTrialError:
+            same = False
+        if not same:
+            yield f"{store.name}: {name}: the stored trial has other bits"
+
+
+def sampled_trials(out: Path) -> pd.DataFrame:
+    """Return every 20th row of trials.csv that belongs to one of the paper's experiments."""
+    trials = pd.read_csv(out / "trials.csv", keep_default_na=False)
+    return trials[trials["task"].isin(list(EXPERIMENTS))].iloc[::EVERY]
+
+
+def setting_of(task: str, method: str, choices: str) -> Setting:
+    """Return the setting of a row of trials.csv."""
+    values: dict[str, Value] = {}
+    for choice in choices.split():
+        id, _, value = choice.partition("=")
+        entry = register()[id]
+        values[entry.field.split(".")[1]] = type(entry.default)(value)
+    return Setting(load_demos(resolve(EXPERIMENTS[task].demos)), method, Params.of(**values))
+
+
+def same_bits(one: Trial, other: Trial) -> bool:
+    """Return whether two trials are equal to the last bit, but for their snapshots."""
+    arrays = ("errors", "weights", "q", "values")
+    pairs = [(getattr(one, name), getattr(other, name)) for name in arrays]
+    if len(one.episodes) != len(other.episodes):
+        return False
+    for mine, others in zip(one.episodes, other.episodes, strict=True):
+        pairs += zip(mine, others, strict=True)
+    return (one.converged, one.steps) == (other.converged, other.steps) and all(
+        np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in pairs
+    )
+
+
+def verify(out: Path, store: Path, *, jobs: int, echo: Callable[[str], object]) -> Sequence[str]:
+    """Check everything; say what is being done, and return what is wrong."""
+    echo(f"hashing the outputs in {out.name}")
+    wrong = list(verify_outputs(out))
+    echo("comparing the installed packages with environment.lock")
+    wrong += verify_packages(PROJECT / "environment.lock")
+    if (out / "trials.csv").exists():
+        wrong += verify_trials(
+            out,
+            store,
+            jobs=jobs,
+            report=lambda n: echo(f"recomputing {n} trials, one in {EVERY}"),
+        )
+    return wrong

@@ -1,0 +1,177 @@
+"""Trials on a Dask cluster: a scheduler and two workers on loopback, and what may go wrong."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_notebook
+
+from replication import Demos
+from replication.irl import Trial
+from replication.params import Params
+from replication.setting import Setting
+from replication.store import Store
+from replication.trials import SCHEDULER, Results, WorkerError, run_trials
+
+# distributed leaves sockets to the garbage collector
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+TASKS, TRIALS = 12, 3
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(
+        n_workers=2, processes=True, threads_per_worker=1, host="127.0.0.1",
+        dashboard_address=None, worker_dashboard_address=None,
+    ) as cluster:
+        pids = [nanny.process.pid for nanny in cluster.workers.values()]
+        print(cluster.scheduler_address, *pids, flush=True)
+        sys.stdin.read()
+"""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """The address of a scheduler and the processes of its workers."""
+
+    address: str
+    workers: list[int]
+
+
+StartCluster = Callable[..., Cluster]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[StartCluster]:
+    """Start a scheduler with two workers, whose code may be another folder's."""
+    running: list[subprocess.Popen[str]] = []
+
+    def start(code: str = "") -> Cluster:
+        program = tmp_path / "cluster.py"
+        program.write_text(CLUSTER)
+        process = subprocess.Popen(
+            [sys.executable, str(program)],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": code},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        running.append(process)
+        assert process.stdout is not None
+        address, *workers = process.stdout.readline().split()
+        return Cluster(address, [int(pid) for pid in workers])
+
+    yield start
+    for process in running:
+        process.communicate(timeout=30)  # closes its input, at which it ends
+
+
+def _run(demos: Demos, path: Path, episodes: int = 60) -> Results:
+    settings = [
+        Setting(demos, "unified", Params.of(episodes=episodes + n, horizon=40, max_iterations=40))
+        for n in range(TASKS)
+    ]
+    return run_trials(settings, trials=TRIALS, store=Store(path), seed=5)
+
+
+def _bits(results: Results) -> list[bytes]:
+    return [
+        array.tobytes()
+        for setting in results.settings
+        for k in range(results.trials)
+        for trial in [results.trial(setting, k)]
+        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
+    ]
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_cluster_does_not_change_a_bit(
+    small_demos: Demos,
+    tmp_path: Path,
+    start: StartCluster,
+    monkeypatch: pytest.MonkeyPatch,
+    killed: bool,
+) -> None:
+    """Two workers give the bits that one process gives, also when one of them is killed."""
+    alone = _bits(_run(small_demos, tmp_path / "alone.sqlite"))
+    cluster = start()
+    monkeypatch.setenv(SCHEDULER, cluster.address)
+    put = Store.put
+    killings: list[int] = []
+
+    def put_and_kill(store: Store, found: list[tuple[str, Trial]]) -> None:
+        put(store, found)
+        if killed and not killings:
+            killings.append(cluster.workers[0])
+            os.kill(cluster.workers[0], signal.SIGKILL)
+
+    monkeypatch.setattr(Store, "put", put_and_kill)
+    assert _bits(_run(small_demos, tmp_path / "shared.sqlite")) == alone
+    assert len(killings) == killed
+
+
+def test_a_worker_with_other_code_is_refused(
+    small_demos: Demos, tmp_path: Path, start: StartCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers whose code differs are found out, and nothing of theirs is stored."""
+    shutil.copytree(Path(__file__).parents[1] / "replication", tmp_path / "other" / "replication")
+    with (tmp_path / "other" / "replication" / "compute.py").open("a") as file:
+        file.write("\nCHANGED = True\n")
+    monkeypatch.setenv(SCHEDULER, start(str(tmp_path / "other")).address)
+    with pytest.raises(WorkerError, match=r"other code.*install the same commit"):
+        _run(small_demos, tmp_path / "trials.sqlite")
+    store = Store(tmp_path / "trials.sqlite")
+    with store._connection as connection:
+        assert connection.execute("SELECT COUNT(*) FROM trials").fetchone() == (0,)
+
+
+def test_a_notebook_runs_on_a_cluster(
+    small_demos: Demos, tmp_path: Path, start: StartCluster
+) -> None:
+    """`replicate run --scheduler` sends a notebook's trials there."""
+    cells = [
+        new_code_cell('out = "x"\nseed = 5', metadata={"tags": ["parameters"]}, id="a"),
+        new_code_cell(
+            "import os\nfrom pathlib import Path\n"
+            "from replication import Maze, demonstrate, trials\n"
+            "from replication.params import Params\n"
+            "from replication.setting import Setting\n"
+            "from replication.store import Store\n"
+            "maze = Maze.from_text('....G\\n.#...\\nS....')\n"
+            "params = Params.of(episodes=60, horizon=40, max_iterations=40)\n"
+            "setting = Setting(demonstrate('small', maze), 'unified', params)\n"
+            "store = Store(Path(out).parent / 'trials.sqlite')\n"
+            "results = trials.run_trials([setting], trials=3, store=store, seed=seed)\n"
+            "(Path(out) / 'curves.txt').write_text(results.errors(setting).tobytes().hex())",
+            id="b",
+        ),
+    ]
+    node = new_notebook(cells=cells, metadata={"replication": {"outputs": ["curves.txt"]}})
+    path = tmp_path / "toy.ipynb"
+    nbformat.write(node, path)
+    address = start().address
+    found = []
+    for words in ([], ["--scheduler", address]):
+        out = tmp_path / f"out-{len(words)}"
+        code = "from replication.cli import app; app()"
+        done = subprocess.run(
+            [sys.executable, "-c", code, "run", str(path), "--out", str(out), *words],
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        found.append((out / "curves.txt").read_text())
+    assert found[0] == found[1]

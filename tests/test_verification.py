@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+import json
+import sqlite3
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from replication import Demos, provenance, save_demos, verification
+from replication.choices import register
+from replication.comparisons import EXPERIMENTS, Experiment
+from replication.compute import trial_key
+from replication.files import write_file
+from replication.irl import Trial
+from replication.params import Params
+from replication.paths import PROJECT
+from replication.setting import Setting
+from replication.store import Store
+from replication.tables import write_trials
+from replication.trials import run_trials
+from replication.verification import (
+    same_bits,
+    sampled_trials,
+    setting_of,
+    verify,
+    verify_outputs,
+    verify_packages,
+    verify_trials,
+)
+
+FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
+TRIALS = 5
+
+
+@pytest.fixture
+def out(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with the trials.csv of a small task, and its store beside it."""
+    save_demos(small_demos, tmp_path / "small.json")
+    experiment = Experiment(str(tmp_path / "small.json"), FEW, ("adaboost", "unified"))
+    monkeypatch.setattr(verification, "EXPERIMENTS", {"small": experiment})
+    monkeypatch.setattr(verification, "EVERY", 3)
+    settings = list(experiment.settings().values())
+    results = run_trials(settings, trials=TRIALS, store=Store(tmp_path / "s.sqlite"), seed=4)
+    (tmp_path / "out").mkdir()
+    write_trials(results.frame(), tmp_path / "out" / "trials.csv")
+    return tmp_path / "out"
+
+
+def wrong(out: Path, **options: Any) -> list[str]:
+    """Return what is wrong with the trials of a folder."""
+    return list(verify_trials(out, out.parent / "s.sqlite", **options))
+
+
+# --- outputs ---------------------------------------------------------------------------------
+
+
+def test_outputs_are_held_against_the_manifest(tmp_path: Path) -> None:
+    """Every file that changed or is gone is named, with the notebook that made it."""
+    assert "provenance.json is missing" in next(verify_outputs(tmp_path))
+    for name in ("a.csv", "b.csv", "c.csv"):
+        (tmp_path / name).write_text(name)
+    hashes = {name: provenance.file_hash(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")}
+    document = {
+        "format": provenance.FORMAT,
+        "version": provenance.VERSION,
+        "notebooks": {"toy": {"inputs": {}, "outputs": hashes}},
+    }
+    write_file(tmp_path / provenance.MANIFEST, json.dumps(document))
+    assert list(verify_outputs(tmp_path)) == []
+    (tmp_path / "a.csv").write_text("a.csv ")
+    (tmp_path / "b.csv").unlink()
+    assert list(verify_outputs(tmp_path)) == [
+        "a.csv is changed since toy made it",
+        "b.csv is missing since toy made it",
+    ]
+
+
+# --- packages --------------------------------------------------------------------------------
+
+
+def test_packages_are_held_against_the_lock(tmp_path: Path) -> None:
+    """Another version and a package that is missing are named; other platforms' pins are not."""
+    version = metadata.version("numpy")
+    lock = tmp_path / "environment.lock"
+    lock.write_text(
+        f"# a comment\nnumpy=={version} \\\n    --hash=sha256:00 \\\n    --hash=sha256:11\n"
+        f"NumPy=={version}\npandas==0.1 ; python_version > '3'\n"
+        "no-such-package==1.0\nno-such-other==1 ; sys_platform == 'none'\n    # via numpy\n"
+    )
+    pandas = metadata.version("pandas")
+    assert list(verify_packages(lock)) == [
+        f"pandas {pandas} is installed; the lock pins ==0.1",
+        "no-such-package is not installed; the lock pins ==1.0",
+    ]
+
+
+def test_the_projects_lock_can_be_read() -> None:
+    """Each pin of environment.lock is understood."""
+    for said in verify_packages(PROJECT / "environment.lock"):
+        assert "the lock pins ==" in said
+
+
+# --- trials ----------------------------------------------------------------------------------
+
+
+def test_what_was_computed_here_agrees(out: Path) -> None:
+    """A sample is computed again, with or without a store, by any number of workers."""
+    told: list[int] = []
+    assert wrong(out, report=told.append) == []
+    assert told == [len(sampled_trials(out))] == [5]
+    assert wrong(out, jobs=2) == []
+    (out.parent / "s.sqlite").unlink()
+    assert wrong(out) == []
+    assert not (out.parent / "s.sqlite").exists()
+
+
+@pytest.mark.parametrize("column", ["iterations", "converged", "steps", "seed", "trial"])
+def test_a_changed_row_is_found(out: Path, column: str) -> None:
+    """Whatever of a sampled row is not what its trial gives, the row is named."""
+    table = pd.read_csv(out / "trials.csv", keep_default_na=False)
+    value = table.loc[3, column]
+    table.loc[3, column] = not value if column == "converged" else value + 1
+    table.to_csv(out / "trials.csv", index=False)
+    (said,) = wrong(out)
+    assert said.startswith("trials.csv: small, adaboost, EPISODES=60 HORIZON=40 ITERATION-CAP=20, ")
+    assert f"trial {table.loc[3, 'trial']}: " in said
+
+
+@pytest.mark.parametrize("choices", ["NO-CHOICE=1", "EPISODES=many", "ALPHA", "MAP-OPEN=x"])
+def test_a_row_that_means_nothing_is_found(out: Path, choices: str) -> None:
+    """A row that no setting belongs to is named, and the others are computed."""
+    table = pd.read_csv(out / "trials.csv", keep_default_na=False)
+    table.loc[0, "choices"] = choices
+    table.to_csv(out / "trials.csv", index=False)
+    (said,) = wrong(out)
+    assert said.startswith(f"trials.csv: small, adaboost, {choices}: no such setting")
+
+
+def test_a_changed_stored_trial_is_found(out: Path) -> None:
+    """One bit of a stored result, or a record that cannot be read, is found."""
+    store = Store(out.parent / "s.sqlite")
+    row = next(sampled_trials(out).itertuples())
+    setting = setting_of(row.task, row.method, row.choices)
+    key = trial_key(setting, row.seed, row.trial)
+    trial = store.get(key)
+    weights = trial.weights.copy()
+    weights[0, 0] = np.nextafter(weights[0, 0], 1)
+    store.drop(key)
+    store.put([(key, replace(trial, weights=weights))])
+    due = "s.sqlite: small, adaboost, EPISODES=60 HORIZON=40 ITERATION-CAP=20, trial 0: "
+    assert wrong(out) == [f"{due}the stored trial has other bits"]
+    connection = sqlite3.connect(store.path)
+    with connection:
+        connection.execute("UPDATE trials SET record = x'00' WHERE key = ?", (key,))
+    connection.close()
+    assert wrong(out) == [f"{due}the stored trial has other bits"]
+
+
+def test_rows_of_other_tasks_are_left_out(out: Path) -> None:
+    """Only what belongs to an experiment is sampled; a table of defaults has empty choices."""
+    table = pd.read_csv(out / "trials.csv", keep_default_na=False)
+    assert set(sampled_trials(out).index) == {0, 3, 6, 9, 12}
+    table.assign(task="other").to_csv(out / "trials.csv", index=False)
+    assert len(sampled_trials(out)) == 0
+    assert wrong(out) == []
+    table.assign(choices="").to_csv(out / "trials.csv", index=False)
+    assert sampled_trials(out)["choices"].tolist() == [""] * 5
+
+
+def test_one_trial_in_twenty_is_sampled() -> None:
+    """The sample is 5 %."""
+    assert verification.EVERY == 20
+
+
+def test_same_bits_sees_every_part(out: Path) -> None:
+    """Trials that differ in any of their parts but the snapshots are not the same."""
+    row = next(sampled_trials(out).itertuples())
+    key = trial_key(setting_of(row.task, row.method, row.choices), row.seed, row.trial)
+    trial = Store(out.parent / "s.sqlite").get(key)
+    states, actions, hits = trial.episodes[0]
+    episodes = (type(trial.episodes[0])(states, actions, ~hits), *trial.episodes[1:])
+    others: list[Trial] = [
+        replace(trial, errors=trial.errors + 1),
+        replace(trial, weights=-trial.weights),
+        replace(trial, q=trial.q + 1),
+        replace(trial, values=trial.values + 1),
+        replace(trial, converged=not trial.converged),
+        replace(trial, steps=trial.steps + 1),
+        replace(trial, episodes=trial.episodes[1:]),
+        replace(trial, episodes=episodes),
+    ]
+    assert same_bits(trial, replace(trial, errors=trial.errors.copy(), snapshots=None))
+    assert [same_bits(trial, other) for other in others] == [False] * len(others)
+
+
+# --- the settings behind rows ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", list(EXPERIMENTS))
+def test_settings_of_the_experiments_come_back(task: str) -> None:
+    """A row of trials.csv has all that is needed to make its setting again."""
+    for setting in EXPERIMENTS[task].settings().values():
+        again = setting_of(setting.demos.task, setting.method, setting.choices)
+        assert trial_key(again, 1, 0) == trial_key(setting, 1, 0)
+        assert again.params == setting.params
+
+
+FIELDS = {
+    entry.field.split(".")[1]: entry
+    for entry in register().values()
+    if entry.field and entry.field.split(".")[1] in Params().values()
+}
+
+
+@pytest.mark.parametrize("name", sorted(FIELDS))
+def test_every_value_of_a_choice_comes_back(name: str) -> None:
+    """Words, whole numbers and numbers of all digits survive the text of the row."""
+    entry = FIELDS[name]
+    values: list[Any] = list(entry.alternatives)
+    if entry.range is not None:
+        low, high = entry.range
+        values = [low, high, low + (high - low) / 3]
+        if isinstance(entry.default, int):
+            values = [int(low), int(high), int(low) + 1]
+    demos = EXPERIMENTS["open-maze"].settings()["unified", "printed"].demos
+    for value in values:
+        setting = Setting(demos, "unified", Params.of(**{name: value}))
+        again = setting_of("open-maze", "unified", setting.choices)
+        assert again.params == setting.params
+        assert again.choices == setting.choices
+
+
+# --- all together ----------------------------------------------------------------------------
+
+
+def test_everything_is_checked_and_told(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines say what is being done, and all that is wrong comes back."""
+    monkeypatch.setattr(verification, "PROJECT", out.parent)
+    (out.parent / "environment.lock").write_text("numpy==0.1\n")
+    told: list[str] = []
+    found = verify(out, out.parent / "s.sqlite", jobs=1, echo=told.append)
+    assert [said.split()[0] for said in told] == ["hashing", "comparing", "recomputing"]
+    assert len(found) == 2
+    assert "provenance.json is missing" in found[0]
+    assert found[1].startswith("numpy ")
