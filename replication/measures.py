@@ -19,6 +19,9 @@ from replication.params import Report
 from replication.setting import Setting
 from replication.trials import Results
 
+DIGITS = 8
+"""Decimals of a measure, so that a file with ten significant digits holds it exactly."""
+
 
 def measure_trials(
     results: Results, settings: Mapping[Any, Setting], report: Report | None = None
@@ -64,9 +67,9 @@ def measure(
         "iterations": trial.iterations,
         "converged": int(trial.converged),
         "early_errors": early_errors(trial, marked, early),
-        "q_growth": float((values[-1] - values[middle]).mean()),
-        "q_slope": slope(values[-1]),
-        "reward_slope": slope(trial.weights[path].max(axis=1)),
+        "q_growth": round(float((values[-1] - values[middle]).mean()), DIGITS),
+        "q_slope": round(slope(values[-1]), DIGITS),
+        "reward_slope": round(slope(trial.weights[path].max(axis=1)), DIGITS),
     }
 
 

@@ -92,7 +92,7 @@ class TrialBar:
         self._done += trials
         self._steps += steps
         elapsed = max(time.monotonic() - self._began, 1e-9)
-        rate = f"{self._steps / elapsed / 1e6:.0f} M steps/s"
+        rate = _rate(self._steps / elapsed)
         self._bar.update(trials)
         self._bar.set_postfix_str(rate)
         tenth = 10 * self._done // self._total
@@ -176,6 +176,17 @@ class Display:
         if self._trials is not None:
             self._trials.close()
             self._trials = None
+
+
+def _rate(steps: float) -> str:
+    """Return a number of steps a second; those of physics are dear.
+
+    Examples
+    --------
+    >>> _rate(2.13e8), _rate(76_000)
+    ('213 M steps/s', '76 k steps/s')
+    """
+    return f"{steps / 1e6:.0f} M steps/s" if steps >= 1e6 else f"{steps / 1e3:.0f} k steps/s"
 
 
 def _duration(seconds: float) -> str:
