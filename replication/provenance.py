@@ -14,14 +14,16 @@ import json
 import platform
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from replication import paths
 from replication.files import write_file
 from replication.notebooks import Notebook, NotebookError
-from replication.source import bare_source, module_hashes
+from replication.source import PACKAGE, bare_source
 
 MANIFEST = "provenance.json"
 FORMAT, VERSION = "replication-provenance", 1
@@ -73,7 +75,7 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any]) -> Inputs:
         "cells": text_hash(json.dumps([bare_source(cell) for cell in cells])),
         "parameters": {k: v for k, v in sorted(parameters.items()) if k not in NEUTRAL},
         "outputs": sorted(notebook.outputs),
-        "source": module_hashes(_imported(cells)),
+        "source": _source_hashes(_imported(map(ast.parse, filter(_is_python, cells)))),
         "data": dict(sorted(data.items())),
         "lock": file_hash(paths.PROJECT / "environment.lock"),
     }
@@ -172,21 +174,52 @@ def _data_hash(path: Path) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _imported(cells: list[str]) -> list[str]:
-    """Return the names of what some cells import."""
+def _is_python(cell: str) -> bool:
+    """Return whether a cell can be parsed; if not, its run will say so."""
+    try:
+        ast.parse(cell)
+    except SyntaxError:
+        return False
+    return True
+
+
+def _imported(trees: Iterable[ast.Module]) -> list[str]:
+    """Return the names of what some code imports, of modules and of what is in them."""
     names = []
-    for cell in cells:
-        try:
-            tree = ast.parse(cell)
-        except SyntaxError:  # its run will say so
-            continue
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Import):
-                names += [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                names.append(node.module)
-                names += [f"{node.module}.{alias.name}" for alias in node.names]
+    for node in chain.from_iterable(map(ast.walk, trees)):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.append(node.module)
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
     return names
+
+
+def _source_hashes(names: Iterable[str]) -> dict[str, str]:
+    """Return the hash of each module of the package that is among some names or imported by one."""
+    found: dict[str, str] = {}
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in found and (module := _module(name)) is not None:
+            found[name], imports = module
+            waiting += imports
+    return dict(sorted(found.items()))
+
+
+@cache
+def _module(name: str) -> tuple[str, list[str]] | None:
+    """Return the hash of a module of the package and the names it imports; None for other names.
+
+    Each module is read once, however many notebooks lead to it, and none is imported.
+    """
+    package, *parts = name.split(".")
+    path = Path(__file__).parent.joinpath(*parts)
+    for file in (path / "__init__.py", path.with_suffix(".py")):
+        if package == PACKAGE and file.is_file():
+            text = file.read_text(encoding="utf-8")
+            return text_hash(bare_source(text))[:16], _imported([ast.parse(text)])
+    return None
 
 
 def _name(path: Path) -> str:
