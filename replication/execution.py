@@ -26,6 +26,7 @@ from nbformat.reader import NotJSONError
 from papermill.exceptions import PapermillExecutionError
 
 from replication import paths
+from replication.executed import drop_empty_tags
 from replication.files import write_file
 from replication.notebooks import Notebook, RunError, first_line, refuse
 from replication.progress import EVENTS, Display
@@ -38,9 +39,6 @@ KERNEL = "replication"
 
 MISTAKES = frozenset({"ChoiceError", "ClaimError", "DemoError", "MazeError"})
 """What a cell raises when the user's parameters or files are at fault, not the notebook."""
-
-INJECTED = "injected-parameters"
-"""The tag that papermill gives to its own cell."""
 
 # What papermill logs of a failure is said again, and better, by the error that is raised.
 logging.getLogger("papermill").addHandler(logging.NullHandler())
@@ -105,24 +103,6 @@ def execute(
             write_file(executed, _clean(notebook, draft, stage, target))
         except OSError as error:
             raise RunError(f"{executed}: cannot be written: {first_line(error)}") from error
-
-
-def render(notebook: Notebook, executed: Path) -> None:
-    """Bring the prose of an executed notebook up to date; nothing is executed."""
-    node = nbformat.read(executed, as_version=4)
-    code = [cell for cell in node.cells if cell.cell_type == "code"]
-    cells = []
-    for at, cell in enumerate(copy.deepcopy(notebook.node.cells)):
-        _drop_empty_tags(cell)
-        cells.append(cell)
-        if cell.cell_type != "code":
-            continue
-        done = code.pop(0)
-        cell.outputs, cell.execution_count = done.outputs, done.execution_count
-        if at == notebook.at and code and INJECTED in code[0].metadata.get("tags", []):
-            cells.append(code.pop(0))
-    node.cells = cells
-    write_file(executed, str(nbformat.writes(node)) + "\n")
 
 
 @contextmanager
@@ -230,7 +210,7 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
     added = 0
     for cell in node.cells:
         cell.metadata.pop("papermill", None)
-        _drop_empty_tags(cell)
+        drop_empty_tags(cell)
         if cell.id not in known:
             added += 1
             cell.id = f"papermill-{added}"
@@ -239,12 +219,6 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
     shown = target.resolve().relative_to(paths.PROJECT).as_posix() if inside else target.name
     text = str(nbformat.writes(node))
     return text.replace(json.dumps(str(stage))[1:-1], json.dumps(shown)[1:-1]) + "\n"
-
-
-def _drop_empty_tags(cell: Any) -> None:
-    """Make cells that papermill has seen equal to those that it has not."""
-    if not cell.metadata.get("tags", True):
-        del cell.metadata["tags"]
 
 
 def _declared(notebook: Notebook, line: str) -> str:

@@ -81,6 +81,16 @@ class Notebook:
         """The file's name without its suffix."""
         return self.path.stem
 
+    @property
+    def executed(self) -> str:
+        """Name of the executed notebook's file, wherever it is written."""
+        return f"{self.name}.ipynb"
+
+    @property
+    def published(self) -> tuple[str, ...]:
+        """All files that a run publishes: the outputs, and the executed notebook."""
+        return (*self.outputs, self.executed)
+
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse values of parameters that the notebook does not have, or of another type.
 

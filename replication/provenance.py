@@ -113,7 +113,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 def record(folder: Path, notebook: Notebook, inputs: Inputs) -> None:
     """Enter a finished run into the manifest of the folder that holds its outputs."""
     notebooks = read_manifest(folder)
-    outputs = {name: file_hash(folder / name) for name in sorted(notebook.outputs)}
+    outputs = {name: file_hash(folder / name) for name in sorted(notebook.published)}
     notebooks[notebook.name] = {
         "inputs": inputs,
         "outputs": outputs,
@@ -122,6 +122,17 @@ def record(folder: Path, notebook: Notebook, inputs: Inputs) -> None:
     for other in notebooks.values():  # a shared file has changed for all that share it
         shared = other["outputs"].keys() & set(notebook.merged)
         other["outputs"].update({name: outputs[name] for name in shared})
+    _write_manifest(folder, notebooks)
+
+
+def rehash(folder: Path, notebook: str, name: str) -> None:
+    """Enter the hash of one published file of a notebook anew."""
+    notebooks = read_manifest(folder)
+    notebooks[notebook]["outputs"][name] = file_hash(folder / name)
+    _write_manifest(folder, notebooks)
+
+
+def _write_manifest(folder: Path, notebooks: Mapping[str, Any]) -> None:
     document = {"format": FORMAT, "version": VERSION, "notebooks": notebooks}
     text = json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False)
     write_file(folder / MANIFEST, text + "\n")

@@ -26,14 +26,9 @@ from typing import Any
 import joblib
 
 from replication import paths, provenance
+from replication.executed import linked, render, shows
 from replication.files import write_file
-from replication.notebooks import (
-    Notebook,
-    NotebookError,
-    RunError,
-    read_notebook,
-    refuse,
-)
+from replication.notebooks import Notebook, NotebookError, RunError, read_notebook, refuse
 
 TIMEOUT = 3600
 """Seconds that one cell may take unless told otherwise."""
@@ -201,7 +196,7 @@ def run_notebooks(
     runs = prepare(notebooks, profile=profile, jobs=jobs, seed=seed, parameters=parameters)
     folder = executed or executed_folder(out, run_name(profile, seed=seed, parameters=parameters))
     for run in runs:
-        for target in (out / name for name in run.notebook.outputs):
+        for target in (out / name for name in run.notebook.published):
             if target.is_dir():
                 refuse(
                     target,
@@ -221,7 +216,7 @@ def run_notebooks(
             if state.kind == FRESH and not force:
                 echo(f"{name}: fresh, nothing to do")
             elif state.kind == PROSE and not force:
-                _render(run, folder)
+                _render(run, out, folder)
                 echo(f"{name}: fresh; its text is brought up to date, nothing is executed")
             else:
                 waiting.append(run)
@@ -272,17 +267,17 @@ def _run_all(
                 values,
                 stage,
                 target=out,
-                executed=folder / f"{notebook.name}.ipynb",
+                executed=folder / notebook.executed,
                 display=display,
                 **options,
             )
             _check_outputs(notebook, stage, stamps)
-            published += _publish(notebook, stage, out)
+            published += _publish(notebook, stage, out, folder)
             provenance.record(out, notebook, run.inputs)
             shutil.rmtree(stage)
             seconds = time.monotonic() - began
-            circumstances = {"seconds": round(seconds, 1), "prose": _prose(notebook)}
-            _remember(folder, notebook.name, where | circumstances | {"finished": _now()})
+            circumstances = {"seconds": round(seconds, 1), "finished": _now()}
+            _remember(folder, notebook.name, where | circumstances)
             display.end()
             echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s")
     return list(dict.fromkeys(published))
@@ -321,12 +316,13 @@ def state_of(run: Run, out: Path, folder: Path) -> State:
         return State(MISSING)
     why = provenance.changes(entry["inputs"], run.inputs)
     why += [f"{output} is {how}" for output, how in lost.items()]
+    if run.notebook.executed not in entry["outputs"]:
+        why.append("its executed notebook was not published")
     if why:
         return State(STALE, tuple(why))
-    done = read_runs(folder).get(name)
-    if done is None or not (folder / f"{name}.ipynb").exists():
-        return State(STALE, ("there is no executed notebook",))
-    return State(FRESH if done["prose"] == _prose(run.notebook) else PROSE)
+    if (folder / run.notebook.executed).exists() and name not in read_runs(folder):
+        return State(STALE, ("its last run did not finish",))
+    return State(FRESH if shows(out / run.notebook.executed, run.notebook) else PROSE)
 
 
 def read_runs(folder: Path) -> dict[str, Any]:
@@ -349,17 +345,12 @@ def _now() -> str:
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def _render(run: Run, folder: Path) -> None:
-    from replication.execution import render
-
-    name = run.notebook.name
-    render(run.notebook, folder / f"{name}.ipynb")
-    _remember(folder, name, {**read_runs(folder)[name], "prose": _prose(run.notebook)})
-
-
-def _prose(notebook: Notebook) -> str:
-    """Return the hash of all text of a notebook: what a reader of the executed one sees."""
-    return provenance.text_hash(json.dumps([cell.source for cell in notebook.node.cells]))
+def _render(run: Run, out: Path, folder: Path) -> None:
+    """Bring the text of the executed notebook up to date, the published one and the full one."""
+    name = run.notebook.executed
+    for executed in (path for path in (folder / name, out / name) if path.exists()):
+        render(run.notebook, executed)
+    provenance.rehash(out, run.notebook.name, name)
 
 
 def _commit() -> tuple[str, bool]:
@@ -406,7 +397,7 @@ def _check_apart(notebooks: Sequence[Notebook]) -> None:
     """Refuse notebooks that would overwrite each other's files."""
     owners: dict[str, Notebook] = {}
     for notebook in notebooks:
-        own = {f"{notebook.name}.ipynb", *notebook.outputs} - set(notebook.merged)
+        own = set(notebook.published) - set(notebook.merged)
         for name in sorted(own):
             if name in owners:
                 refuse(notebook.path, f"would overwrite {name} of {owners[name].path}")
@@ -444,10 +435,14 @@ def _check_outputs(notebook: Notebook, stage: Path, stamps: Mapping[str, int]) -
         raise RunError(f"{notebook.path}: written but not declared: {', '.join(extra)}")
 
 
-def _publish(notebook: Notebook, stage: Path, out: Path) -> list[Path]:
-    """Move all outputs to `out`: copies first, which may fail, then only renaming."""
-    drafts = {out / name: out / f".{name}.{os.getpid()}" for name in notebook.outputs}
+def _publish(notebook: Notebook, stage: Path, out: Path, folder: Path) -> list[Path]:
+    """Move all outputs to `out`: copies first, which may fail, then only renaming.
+
+    The executed notebook in `folder` is among them, with links to the other ones.
+    """
+    drafts = {out / name: out / f".{name}.{os.getpid()}" for name in notebook.published}
     try:
+        write_file(stage / notebook.executed, linked(folder / notebook.executed, stage))
         for target, draft in drafts.items():
             shutil.copyfile(stage / target.name, draft)
         for target, draft in drafts.items():

@@ -52,7 +52,7 @@ def status_lines(runs: Sequence[Run], out: Path, folder: Path) -> list[str]:
 def undeclared(runs: Sequence[Run], out: Path) -> list[Path]:
     """Return the files in a folder of outputs that no notebook declares."""
     declared = {provenance.MANIFEST, ".lock"}
-    declared |= {name for run in runs for name in run.notebook.outputs}
+    declared |= {name for run in runs for name in run.notebook.published}
     return sorted(path for path in out.iterdir() if path.is_file() and path.name not in declared)
 
 

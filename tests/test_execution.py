@@ -11,7 +11,8 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import paths
-from replication.execution import execute, render
+from replication.executed import render
+from replication.execution import execute
 from replication.notebooks import NotebookError, RunError, read_notebook
 from replication.progress import Display
 

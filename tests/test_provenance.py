@@ -175,6 +175,7 @@ def test_equal_runs_have_equal_manifests(write: Write, project: Path) -> None:
         folder.mkdir()
         for name in order:
             (folder / f"{name}.csv").write_text(name)
+            (folder / f"{name}.ipynb").write_text("executed")
             notebook = write(name=name, outputs=[f"{name}.csv"])
             record(folder, notebook, inputs_of(notebook, {"jobs": number + 1}))
         texts.append((folder / provenance.MANIFEST).read_text())

@@ -23,6 +23,7 @@ from replication import Demos, execution, paths
 from replication.files import write_file
 from replication.notebooks import Notebook, NotebookError, RunError
 from replication.regenerate import read_runs, run_notebooks
+from replication.verification import verify_outputs
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
@@ -147,7 +148,8 @@ def test_changed_results_never_go_to_figures(
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     (tmp_path / "environment.lock").touch()
     path = write("(folder / 'a').touch()", outputs=["a"], parameters=f"{PARAMETERS}\nstore = ''")
-    assert run(path, parameters={"store": "x", "jobs": 1}) == [tmp_path / "figures" / "a"]
+    published = run(path, parameters={"store": "x", "jobs": 1})
+    assert published == [tmp_path / "figures" / name for name in ("a", "toy.ipynb")]
     for options, named in (
         ({"seed": 1}, "with --seed$"),
         ({"parameters": {"trials": 3}}, "with -p trials$"),
@@ -195,7 +197,7 @@ def test_run_publishes_what_is_declared(
     published = run(
         path, profile="quick", seed=5, parameters={"choices": choices}, echo=lines.append
     )
-    assert published == [tmp_path / "figures" / "seen.json"]
+    assert published == [tmp_path / "figures" / name for name in ("seen.json", "toy.ipynb")]
     expected = [sys.executable, str(tmp_path), 7, 5, 1, choices, False]
     assert json.loads(published[0].read_text()) == expected
     assert len(lines) == 2
@@ -228,7 +230,7 @@ def test_merged_file_is_there_when_the_notebook_starts(
     ]
     lines: list[str] = []
     published = run(*notebooks, jobs=None, echo=lines.append)
-    assert published == [tmp_path / "figures" / "rows.csv"]
+    assert [path.name for path in published] == ["rows.csv", "one.ipynb", "two.ipynb"]
     assert published[0].read_text() == "one\ntwo\n"
     assert "two: 0 outputs and rows of rows.csv in" in lines[-1]
     with pytest.raises(RunError, match=r"declared but not written: rows\.csv"):
@@ -310,7 +312,7 @@ def test_first_failure_stops_the_rest(write: Write, run: Run, tmp_path: Path) ->
     outputs = {"one": ["1"], "two": [], "three": ["3"]}
     with pytest.raises(RunError, match=r"two\.ipynb: cell 4 failed: ZeroDivisionError"):
         run(*(write(code, name=name, outputs=outputs[name]) for name, code in cells.items()))
-    assert files(tmp_path / "figures") == ["1"]
+    assert files(tmp_path / "figures") == ["1", "one.ipynb"]
     assert not (tmp_path / "executed" / "three.ipynb").exists()
 
 
@@ -406,7 +408,8 @@ def test_nothing_runs_when_nothing_has_changed(
     """A second run executes nothing, publishes nothing, writes no file and says so."""
     run(toy(write))
     assert begun == ["toy"]
-    written = [project / "figures" / name for name in ("a.txt", "b.txt", "provenance.json")]
+    names = ("a.txt", "b.txt", "toy.ipynb", "provenance.json")
+    written = [project / "figures" / name for name in names]
     written += [project / "executed" / name for name in ("toy.ipynb", "run.json")]
     times = [path.stat().st_mtime_ns for path in written]
     lines: list[str] = []
@@ -424,7 +427,7 @@ def test_a_change_that_matters_executes_again(
 ) -> None:
     """Code, parameters, data, lock, outputs and executed notebook count; then all is fresh."""
     path = toy(write)
-    figures, executed = project / "figures", project / "executed"
+    figures = project / "figures"
     run(path)
     if change == "cell":
         path = toy(write, "value = trials + 1")
@@ -439,16 +442,28 @@ def test_a_change_that_matters_executes_again(
     elif change == "edited":
         (figures / "a.txt").write_text("mine")
     elif change == "executed":
-        (executed / "toy.ipynb").unlink()
+        (figures / "toy.ipynb").unlink()
     elif change == "runs":
-        (executed / "run.json").write_text("[1]")
+        (project / "executed" / "run.json").write_text("[1]")
     published = run(path)
     assert begun == ["toy", "toy"]
-    assert [path.name for path in published] == ["a.txt", "b.txt"]
+    assert [path.name for path in published] == ["a.txt", "b.txt", "toy.ipynb"]
     due = {"cell": "4", "literal": "4"}.get(change, "3")
-    assert [path.read_text() for path in published] == [due, due]
+    assert [path.read_text() for path in published[:2]] == [due, due]
     run(path)
     assert begun == ["toy", "toy"]
+
+
+def test_results_from_elsewhere_are_fresh(
+    write: Write, run: Run, project: Path, no_kernel: None, begun: list[str]
+) -> None:
+    """Published outputs whose run is not known here, as in a fresh clone, are not made again."""
+    path = toy(write)
+    run(path)
+    shutil.rmtree(project / "executed")
+    lines: list[str] = []
+    assert run(path, echo=lines.append) == []
+    assert lines == ["toy: fresh, nothing to do"]
 
 
 def test_cells_that_move_across_the_parameters_cell_count(
@@ -505,9 +520,11 @@ def test_prose_is_rendered_and_not_executed(
     assert lines == ["toy: fresh; its text is brought up to date, nothing is executed"]
     assert begun == ["toy"]
     assert (project / "figures" / "a.txt").stat().st_mtime_ns == before
-    shown = nbformat.read(project / "executed" / "toy.ipynb", as_version=4)
-    assert [cell.source for cell in shown.cells] == [cell.source for cell in node.cells]
-    assert shown.cells[3].execution_count == 1
+    for folder in ("executed", "figures"):
+        shown = nbformat.read(project / folder / "toy.ipynb", as_version=4)
+        assert [cell.source for cell in shown.cells] == [cell.source for cell in node.cells]
+        assert shown.cells[3].execution_count == 1
+    assert list(verify_outputs(project / "figures")) == []
     run(path, echo=lines.append)
     assert lines[-1] == "toy: fresh, nothing to do"
 
@@ -579,7 +596,7 @@ def test_a_second_run_says_that_it_waits(
         assert begun == []
     second.join(timeout=60)
     assert begun == ["toy"]
-    assert files(project / "figures") == ["a.txt", "b.txt"]
+    assert files(project / "figures") == ["a.txt", "b.txt", "toy.ipynb"]
 
 
 def test_runs_at_the_same_time_leave_whole_outputs(

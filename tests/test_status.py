@@ -133,8 +133,8 @@ def test_outputs_without_a_record_are_stale(project: Path) -> None:
     (project / "figures" / "provenance.json").write_text("{")
     assert lines(project)[1] == "    because there is no record of how they were made"
     run(project, "maze")
-    (project / "done" / "maze.ipynb").unlink()
-    assert lines(project)[1] == "    because there is no executed notebook"
+    (project / "figures" / "maze.ipynb").unlink()
+    assert lines(project)[1] == "    because maze.ipynb is missing"
 
 
 def test_notebooks_have_states_of_their_own(project: Path) -> None:
