@@ -45,7 +45,7 @@ readme: $(VENV)/.ready ## bring the claims in README.md up to date with figures/
 lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check them on every Python
 	$(RUN) -m uv pip compile --no-config --quiet --universal --fork-strategy fewest --python-version 3.11 \
 	    --generate-hashes --only-binary :all: --upgrade --no-annotate \
-	    --custom-compile-command 'make lock' --extra dev --output-file environment.lock pyproject.toml
+	    --custom-compile-command 'make lock' --extra site --extra dev --output-file environment.lock pyproject.toml
 	$(RUN) tools/check_lock.py
 	@set -e; for version in 3.11 3.12 3.13; do \
 	    echo "resolving environment.lock for Python $$version"; \
