@@ -6,17 +6,13 @@ of `replication.figures` hold here too: no pyplot, and equal numbers give equal 
 
 from __future__ import annotations
 
-import hashlib
-import html
 import itertools
-import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.animation import FuncAnimation, PillowWriter
@@ -152,24 +148,31 @@ def _ray_tips(world: FastSoccerWorld) -> Floats:
 
 def numbers(field: SoccerField, demos: Demos) -> pd.DataFrame:
     """Return what Fig. 11 shows: a row for each border between two decisions of each demo."""
-    tables = []
-    for demo in demos.correct + demos.incorrect:
-        one = trace(field, demo.actions)
-        tables.append(
-            pd.DataFrame(
-                {
-                    "kind": demo.kind,
-                    "demo": demo.name,
-                    "decision": np.arange(len(one.times)),
-                    "time": one.times,
-                    "x": one.poses[:, 0],
-                    "y": one.poses[:, 1],
-                    "heading": one.poses[:, 2],
-                    "detected": one.detected,
-                }
-            )
-        )
+    every = demos.correct + demos.incorrect
+    tables = [_trace_numbers(trace(field, demo.actions)) for demo in every]
+    for demo, table in zip(every, tables, strict=True):
+        table.insert(0, "kind", demo.kind)
+        table.insert(1, "demo", demo.name)
     return pd.concat(tables, ignore_index=True)
+
+
+def film_numbers(field: SoccerField, episodes: Mapping[str, Sequence[int]]) -> pd.DataFrame:
+    """Return what some episodes show, moving: a row for each border between two decisions."""
+    tables = {title: _trace_numbers(trace(field, actions)) for title, actions in episodes.items()}
+    return pd.concat(tables, names=["episode", None]).reset_index("episode")
+
+
+def _trace_numbers(one: Trace) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "decision": np.arange(len(one.times)),
+            "time": one.times,
+            "x": one.poses[:, 0],
+            "y": one.poses[:, 1],
+            "heading": one.poses[:, 2],
+            "detected": one.detected,
+        }
+    )
 
 
 def describe_field(field: SoccerField) -> str:
@@ -577,32 +580,3 @@ def save_gif(animation: FuncAnimation, path: Path) -> Path:
         draft = Path(folder) / "draft.gif"
         animation.save(draft, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=DPI)
         return write_file(path, draft.read_bytes())
-
-
-_ICONS = {
-    "fa-minus": "&minus;",
-    "fa-fast-backward": "|&lt;",
-    "fa-step-backward": "&lt;",
-    "fa-play fa-flip-horizontal": "&#9664;",
-    "fa-pause": "||",
-    "fa-play": "&#9654;",
-    "fa-step-forward": "&gt;",
-    "fa-fast-forward": "&gt;|",
-    "fa-plus": "+",
-}
-
-
-def player(animation: FieldAnimation) -> str:
-    """Return an animation as HTML with buttons, which needs nothing from elsewhere.
-
-    Matplotlib's player loads its icons from the web and has a random id.
-    """
-    with _style(), mpl.rc_context({"savefig.dpi": DPI}):
-        text = animation.to_jshtml(fps=FRAMES_A_SECOND, default_mode="once")
-    text = re.sub(r"<link[^>]*>\s*", "", text)
-    text = re.sub(r'<i class="fa ([^"]*)"></i>', lambda match: _ICONS[match[1]], text)
-    (random_id,) = re.findall(r'<img id="_anim_img(\w+)"', text)
-    content = hashlib.sha256(text.replace(random_id, "").encode()).hexdigest()
-    alternative = html.escape(animation.description)
-    text = text.replace('<img id="', f'<img alt="{alternative}" id="')
-    return text.replace(random_id, content[: len(random_id)])

@@ -365,7 +365,7 @@ def _places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], N
     return columns, maze.shape[0] - 1 - rows
 
 
-def _draw_map(panel: Axes, maze: Maze) -> None:
+def _draw_map(panel: Axes, maze: Maze, *, grid: bool = True) -> None:
     n_rows, n_columns = maze.shape
     x, y = _places(maze, np.flatnonzero(~maze.free))
     for left, bottom in zip(x, y, strict=True):
@@ -381,9 +381,9 @@ def _draw_map(panel: Axes, maze: Maze) -> None:
         upwards = side if 0 <= bottom + side < n_rows else -side
         corner = (left + across / 2, bottom + upwards / 2)
         panel.text(*corner, letter, size=7.5, ha="center", va="center_baseline", zorder=6)
-    for line in range(n_columns + 1):
+    for line in range(n_columns + 1 if grid else 0):
         panel.axvline(line - 0.5, color="0.9", lw=0.4, zorder=0)
-    for line in range(n_rows + 1):
+    for line in range(n_rows + 1 if grid else 0):
         panel.axhline(line - 0.5, color="0.9", lw=0.4, zorder=0)
     panel.set(xlim=(-0.5, n_columns - 0.5), ylim=(-0.5, n_rows - 0.5), aspect="equal")
     panel.set(xticks=range(0, n_columns, 5), yticks=range(0, n_rows, 5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pandas as pd
-from IPython.display import Image, Markdown
+from IPython.display import HTML, Image, Markdown
 from matplotlib.figure import Figure
 
 from replication.figures import save_figure
@@ -43,6 +43,22 @@ class Outputs:
         write_csv(numbers, self.folder / f"{name}.csv")
         png, _ = save_figure(figure, self.folder / name, ("png", "svg"))
         return Image(data=png.read_bytes(), width=700, alt=alt)
+
+    def player(self, player: str, name: str, *, numbers: pd.DataFrame) -> HTML:
+        """Write a moving figure as HTML, and its numbers as CSV; return it for display.
+
+        Parameters
+        ----------
+        player
+            From :mod:`replication.players`.
+        name
+            File name without a suffix.
+        numbers
+            What moves.
+        """
+        write_csv(numbers, self.folder / f"{name}.csv")
+        write_file(self.folder / f"{name}.html", player)
+        return HTML(player)
 
     def table(self, table: pd.DataFrame, name: str, *, readable: pd.DataFrame) -> Markdown:
         """Write a table in full as CSV and for reading as Markdown; return the latter."""

@@ -22,7 +22,6 @@ from replication.field_figures import (
     describe_soccer_demos,
     field_figure,
     numbers,
-    player,
     save_gif,
     soccer_demos_figure,
     trace,
@@ -65,12 +64,6 @@ def play(animation: FieldAnimation, folder: Path) -> None:
 def gif(demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Save a moving figure."""
     return save_gif(moving(demos), tmp_path_factory.mktemp("gif") / "new" / "soccer.gif")
-
-
-@pytest.fixture(scope="module")
-def page(demos: Demos) -> str:
-    """Make a player."""
-    return player(moving(demos))
 
 
 def test_correct_demo_scores_and_slows_down(demos: Demos) -> None:
@@ -220,17 +213,6 @@ def test_moving_titles_tell_the_end(demos: Demos, tmp_path: Path) -> None:
     assert ends[1:3] == ["b\nends after 2 decisions", "c\ncut after 16 decisions"]
     assert re.fullmatch(r"d\ntime out: 6\d\.\d s, [2-8] decisions", ends[3])
     assert all(end.replace("\n", ": ") in shown.description for end in ends[:3])
-
-
-def test_player_needs_nothing_from_elsewhere(page: str, demos: Demos) -> None:
-    """The player names no address, has an alternative text, and is the same when made anew."""
-    text = re.sub(r'"data:image/png;base64,[^"]*"', '""', page)
-    assert "//" not in re.sub(r"(?m)^\s*//.*$", "", text)
-    assert not re.search(r"<link|<i |url\(|import", text)
-    assert text.count("<button") == 9
-    assert "first &amp; &lt;early&gt;: cut after 6 decisions" in text
-    assert re.search(r'<img alt="The robot[^"<>]*" id="_anim_img', text)
-    assert player(moving(demos)) == page
 
 
 def test_descriptions_hold_the_facts(demos: Demos) -> None:
