@@ -254,6 +254,19 @@ def clean(
         typer.echo(f"{'would remove' if dry_run else 'removed'} {_short(path)}")
 
 
+@app.command(epilog="Example: replicate site")
+def site(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the site goes.")] = Path(
+        "build/site"
+    ),
+) -> None:
+    """Build the report from the published results; nothing is executed."""
+    from replication.site import build_site
+
+    first = build_site(_all_notebooks(), out, echo=typer.echo)
+    typer.echo(f"open {first.resolve().as_uri()} in a browser")
+
+
 def _outputs(profile: Profile) -> Path:
     """Return the folder that a profile's outputs go to."""
     paper = profile is Profile.PAPER

@@ -216,7 +216,7 @@ def run_notebooks(
             if state.kind == FRESH and not force:
                 echo(f"{name}: fresh, nothing to do")
             elif state.kind == PROSE and not force:
-                _render(run, out, folder)
+                refresh_text(run, out, folder)
                 echo(f"{name}: fresh; its text is brought up to date, nothing is executed")
             else:
                 waiting.append(run)
@@ -345,7 +345,7 @@ def _now() -> str:
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def _render(run: Run, out: Path, folder: Path) -> None:
+def refresh_text(run: Run, out: Path, folder: Path) -> None:
     """Bring the text of the executed notebook up to date, the published one and the full one."""
     name = run.notebook.executed
     for executed in (path for path in (folder / name, out / name) if path.exists()):

@@ -56,7 +56,8 @@ def update(
     ``confidence``
         The same D; the round's confidence scales the step, w <- w + c (mu_E - mu_i).
     ``graded``
-        AdaBoost.R2: the loss is |mu_E - mu_i| over its maximum, and w moves as in ``mismatch``.
+        AdaBoost.R2: the loss is the size of the residual over its maximum, and w moves as in
+        ``mismatch``.
     ``log-odds``
         No distribution: w <- w + ln((1 + r) / (1 - r)) / 2, r the residual over its maximum.
 

@@ -1,0 +1,52 @@
+"""Sphinx configuration of the report; `make site` lays out the sources and calls Sphinx."""
+
+project = "Unified IRL, replicated"
+author = "The replication authors"
+copyright = "the replication authors, MIT licence"
+language = "en"
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "replication.site.extension",
+]
+exclude_patterns = ["figures", "replication", "data", "source", "_generated"]
+
+nb_execution_mode = "off"
+nb_code_prompt_show = "Show the code of this cell"
+nb_code_prompt_hide = "Hide the code"
+myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+add_module_names = False
+suppress_warnings = ["ref.python"]  # a word of a docstring may be the name of several attributes
+toc_object_entries_show_parents = "hide"
+
+html_theme = "sphinx_book_theme"
+html_title = "Unified IRL, replicated"
+html_theme_options = {
+    "use_download_button": False,
+    "use_fullscreen_button": False,
+    "navbar_persistent": [],
+    "home_page_in_toc": True,
+    "show_navbar_depth": 1,
+    "show_toc_level": 2,
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+}
+html_context = {"default_mode": "auto"}
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_js_files = ["sortable.min.js", "sortable.a11y.min.js"]
+html_math_renderer = "mathml"
+html_copy_source = False
+html_show_sourcelink = False
+html_last_updated_fmt = None
+html_show_sphinx = False

@@ -1,0 +1,10 @@
+"""The report: a static site built from executed notebooks, without executing anything.
+
+`build` checks and stages, `pages` turns an executed notebook into a page, `overview` writes what
+the site says of all of them together, and `extension` is what Sphinx has to know. The prose is in
+`docs/`.
+"""
+
+from replication.site.build import SiteError, build_site
+
+__all__ = ["SiteError", "build_site"]

@@ -1,0 +1,167 @@
+"""Check that all is fresh, lay out the sources, let Sphinx write, put the site in place."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import nbformat
+
+from replication import paths, provenance
+from replication.files import write_file
+from replication.regenerate import (
+    FRESH,
+    PROSE,
+    Run,
+    executed_folder,
+    prepare,
+    read_runs,
+    refresh_text,
+    state_of,
+)
+from replication.site import overview
+from replication.site.pages import Provenance, anchor, page
+from replication.tables import read_table
+
+PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff")
+"""Files of the project that pages link to."""
+
+
+class SiteError(ValueError):
+    """Something that the site is built from is missing or stale; the message is one line."""
+
+
+def build_site(
+    notebooks: Sequence[Path], site: Path, *, echo: Callable[[str], object] = print
+) -> Path:
+    """Build the site from the results in `figures`, without executing anything.
+
+    Text that changed in a notebook is taken over. What a build before has written and still holds
+    is not written again; the site is replaced in one step.
+
+    Parameters
+    ----------
+    notebooks
+        The notebooks that have a page.
+    site
+        Folder of the site; what is in it is replaced.
+    echo
+        Prints a line.
+
+    Returns
+    -------
+    Path
+        The first page.
+
+    Raises
+    ------
+    SiteError
+        If a notebook is stale or failed, or Sphinx refuses a page.
+    """
+    out = paths.PROJECT / "figures"
+    folder = executed_folder(out, "paper")
+    runs = prepare(notebooks, profile="paper")
+    _check(runs, out, folder)
+    work = paths.PROJECT / "build" / "site-work"
+    _stage(runs, out, folder, work / "source")
+    echo(f"writing {len(runs)} notebooks and the pages of docs")
+    _write(work)
+    _replace(work / "html", site)
+    return site / "index.html"
+
+
+def _check(runs: Sequence[Run], out: Path, folder: Path) -> None:
+    """Refuse what is not fresh; take over text that changed."""
+    for run in runs:
+        state = state_of(run, out, folder)
+        if state.kind == PROSE:
+            refresh_text(run, out, folder)
+        elif state.kind != FRESH:
+            name = run.notebook.name
+            why = f": {state.why[0]}" if state.why else ""
+            raise SiteError(f"{name} is {state.kind}{why}; first: replicate run {name}")
+
+
+def _stage(runs: Sequence[Run], out: Path, folder: Path, source: Path) -> None:
+    """Lay out what Sphinx reads, in the project's own order of folders, and remove what is gone."""
+    staged = dict(_sources(runs, out, folder))
+    for name, content in staged.items():
+        target = source / name
+        if not target.exists() or target.read_bytes() != content:  # else its page is written again
+            write_file(target, content)
+    for path in source.rglob("*"):
+        if path.is_file() and path.relative_to(source).as_posix() not in staged:
+            path.unlink()
+
+
+def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str, bytes]]:
+    docs = paths.PROJECT / "docs"
+    for path in sorted(docs.rglob("*.md")):
+        yield path.relative_to(docs).as_posix(), path.read_bytes()
+    for pattern in PLACES:
+        for path in sorted(paths.PROJECT.glob(pattern)):
+            yield path.relative_to(paths.PROJECT).as_posix(), path.read_bytes()
+    yield "_generated/readme.md", _readme().encode()
+    for path in sorted(path for path in out.iterdir() if not path.name.startswith(".")):
+        yield f"figures/{path.name}", path.read_bytes()
+    manifest, remembered = provenance.read_manifest(out), read_runs(folder)
+    for run in runs:
+        name = run.notebook.name
+        done = remembered.get(name, {})
+        came = Provenance(
+            name,
+            manifest[name]["inputs"]["parameters"],
+            done.get("seconds"),
+            done.get("machine", ""),
+        )
+        shown = page(out / run.notebook.executed, out, came)
+        yield f"notebooks/{name}.ipynb", nbformat.writes(shown).encode()
+        yield f"source/{name}.ipynb", run.notebook.path.read_bytes()
+    for name, text in _overview(out).items():
+        yield f"_generated/{name}.md", text.encode()
+
+
+def _readme() -> str:
+    """Return the README; what it links to as a table in a file is a table on a page here."""
+    text = (paths.PROJECT / "README.md").read_text(encoding="utf-8")
+    return re.sub(r"(?<=\()figures/(\w+)\.md(?=\))", lambda match: f"#{anchor(match[1])}", text)
+
+
+def _overview(out: Path) -> dict[str, str]:
+    judged = read_table(out / "claims.csv")
+    return {
+        "verdicts": overview.verdicts(judged),
+        "published": overview.published(judged),
+        "choices": overview.choices(read_table(out / "sensitivity_shares.csv")),
+        "citation": overview.citation((paths.PROJECT / "CITATION.cff").read_text("utf-8")),
+    }
+
+
+def _write(work: Path) -> None:
+    """Let Sphinx write the pages; a warning is an error."""
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-W", "--keep-going"]
+    command += ["-c", str(paths.PROJECT / "docs"), "-d", str(work / "doctrees")]
+    command += [str(work / "source"), str(work / "html")]
+    environment = os.environ | {"PYTHONHASHSEED": "0"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode:
+        said = done.stderr.replace(str(work / "source") + os.sep, "").strip().splitlines()
+        raise SiteError("the pages cannot be written: " + "\n".join(said))
+
+
+def _replace(new: Path, site: Path) -> None:
+    """Put a copy of a folder in the place of another one."""
+    site.parent.mkdir(parents=True, exist_ok=True)
+    draft, old = (site.with_name(f".{site.name}.{kind}") for kind in ("draft", "old"))
+    for left in (draft, old):
+        shutil.rmtree(left, ignore_errors=True)
+    shutil.copytree(new, draft, ignore=shutil.ignore_patterns(".buildinfo", ".doctrees"))
+    if site.exists():
+        site.replace(old)
+    draft.replace(site)
+    shutil.rmtree(old, ignore_errors=True)
