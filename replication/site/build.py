@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import nbformat
@@ -68,7 +68,7 @@ def build_site(
     runs = prepare(notebooks, profile="paper")
     _check(runs, out, folder)
     work = paths.PROJECT / "build" / "site-work"
-    _stage(runs, out, folder, work / "source")
+    _stage(dict(_sources(runs, out, folder)), work)
     echo(f"writing {len(runs)} notebooks and the pages of docs")
     _write(work)
     _replace(work / "html", site)
@@ -87,16 +87,20 @@ def _check(runs: Sequence[Run], out: Path, folder: Path) -> None:
             raise SiteError(f"{name} is {state.kind}{why}; first: replicate run {name}")
 
 
-def _stage(runs: Sequence[Run], out: Path, folder: Path, source: Path) -> None:
-    """Lay out what Sphinx reads, in the project's own order of folders, and remove what is gone."""
-    staged = dict(_sources(runs, out, folder))
+def _stage(staged: Mapping[str, bytes], work: Path) -> None:
+    """Lay out what Sphinx reads, in the project's own order of folders.
+
+    What is the same as before keeps its time, else its page would be written again. Sphinx leaves
+    the pages of sources that are gone, so then everything is made anew.
+    """
+    source = work / "source"
+    there = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
+    if there - staged.keys():
+        shutil.rmtree(work)
     for name, content in staged.items():
         target = source / name
-        if not target.exists() or target.read_bytes() != content:  # else its page is written again
+        if not target.exists() or target.read_bytes() != content:
             write_file(target, content)
-    for path in source.rglob("*"):
-        if path.is_file() and path.relative_to(source).as_posix() not in staged:
-            path.unlink()
 
 
 def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str, bytes]]:
@@ -107,8 +111,9 @@ def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str
         for path in sorted(paths.PROJECT.glob(pattern)):
             yield path.relative_to(paths.PROJECT).as_posix(), path.read_bytes()
     yield "_generated/readme.md", _readme().encode()
-    for path in sorted(path for path in out.iterdir() if not path.name.startswith(".")):
-        yield f"figures/{path.name}", path.read_bytes()
+    for path in sorted(out.glob("[!.]*")):
+        if path.suffix != ".ipynb":
+            yield f"figures/{path.name}", path.read_bytes()
     manifest, remembered = provenance.read_manifest(out), read_runs(folder)
     for run in runs:
         name = run.notebook.name
@@ -143,15 +148,28 @@ def _overview(out: Path) -> dict[str, str]:
 
 
 def _write(work: Path) -> None:
-    """Let Sphinx write the pages; a warning is an error."""
+    """Let Sphinx write the pages that changed; a warning is an error."""
     command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-W", "--keep-going"]
     command += ["-c", str(paths.PROJECT / "docs"), "-d", str(work / "doctrees")]
+    outline, known = _outline(work / "source"), work / "outline"
+    if not known.exists() or known.read_text(encoding="utf-8") != outline:
+        command.append("-a")  # the sidebar of every page shows it
+    known.unlink(missing_ok=True)
     command += [str(work / "source"), str(work / "html")]
-    environment = os.environ | {"PYTHONHASHSEED": "0"}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.replace(str(work / "source") + os.sep, "").strip().splitlines()
-        raise SiteError("the pages cannot be written: " + "\n".join(said))
+        said = done.stderr.replace(str(work / "source") + os.sep, "").strip()
+        raise SiteError(f"the pages cannot be written: {said}")
+    write_file(known, outline)
+
+
+def _outline(source: Path) -> str:
+    """Return the titles of the pages and their order."""
+    found = []
+    for path in sorted(source.glob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        found += re.findall(r"^# [^\n]*|^```{toctree}.*?^```", text, flags=re.MULTILINE | re.DOTALL)
+    return "\n".join(found)
 
 
 def _replace(new: Path, site: Path) -> None:

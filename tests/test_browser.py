@@ -1,0 +1,312 @@
+"""The built site in a real browser, from disk: what a reader sees, on a telephone and on a desk."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from bs4 import BeautifulSoup
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from replication.paths import PROJECT
+from replication.site import build_site
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None,
+    reason="the site is tested in Chromium; on Debian: apt install chromium",
+)
+
+NARROW, WIDE = {"width": 390, "height": 844}, {"width": 1600, "height": 1000}
+PLAYERS = ("notebooks/open_maze", "notebooks/obstacle_maze", "notebooks/soccer")
+READ = (
+    *("index", "choices", "methods", "running", "demos", "cite"),
+    *("api/index", "api/tasks", "api/learning", "api/evidence", "api/drawing", "api/running"),
+    *PLAYERS,
+    *("notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
+)
+"""Every page that is written for readers; others list code."""
+
+SMALL = 5_000_000
+"""Bytes that a page may have, with all that it loads."""
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the site from the published results."""
+    notebooks = sorted((PROJECT / "notebooks").glob("*.ipynb"))
+    return build_site(notebooks, tmp_path_factory.mktemp("site") / "site").parent
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Start the system's Chromium, without anything that it would ask of a network."""
+    quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--no-first-run", *quiet]
+        )
+        yield browser
+        browser.close()
+
+
+Open = Callable[..., Page]
+
+
+@pytest.fixture
+def open_page(browser: Browser, site: Path) -> Iterator[Open]:
+    """Open a page from disk; at the end nothing may have failed or been asked of a network."""
+    faults: list[str] = []
+    contexts = []
+
+    def open_page(name: str, *, size: dict[str, int] = WIDE, **options: Any) -> Page:
+        contexts.append(browser.new_context(viewport=size, **options))  # type: ignore[arg-type]
+        page = contexts[-1].new_page()
+        page.on("console", lambda said: faults.extend([said.text] * (said.type == "error")))
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("requestfailed", lambda one: faults.append(f"failed: {one.url[:200]}"))
+        page.on("request", lambda one: faults.extend([one.url] * (not _is_local(one.url))))
+        page.goto((site / f"{name}.html").as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+def _is_local(address: str) -> bool:
+    return urlparse(address).scheme in ("file", "data", "blob")
+
+
+def test_every_page_for_readers_is_tested(site: Path) -> None:
+    """No page is written that the tests below do not open, but for lists of code."""
+    made = {path.relative_to(site).with_suffix("").as_posix() for path in site.rglob("*.html")}
+    lists = {name for name in made if name.startswith(("_", "genindex", "py-modindex", "search"))}
+    assert made - lists == set(READ)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_pages_load_and_fit(open_page: Open, name: str) -> None:
+    """A page loads from disk without a fault; on a telephone it does not scroll sideways."""
+    for size in (NARROW, WIDE):
+        page = open_page(name, size=size)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+
+
+@pytest.mark.parametrize("name", READ)
+def test_images_are_there_and_speak(open_page: Open, name: str) -> None:
+    """Every picture has loaded and has words for those who do not see it."""
+    page = open_page(name)
+    found = page.evaluate(
+        "Promise.all([...document.images].map(one => one.decode().then(() => [one.alt,"
+        " one.naturalWidth], () => [one.alt, 0])))"
+    )
+    assert all(len(alt) > 20 and width > 0 for alt, width in found), found
+    assert page.evaluate(
+        "[...document.querySelectorAll('main svg.interval')].every(one =>"
+        " one.getAttribute('aria-label'))"
+    )
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", READ)
+def test_pages_are_accessible(open_page: Open, name: str, scheme: str) -> None:
+    """The checks of axe-core find no serious fault, in light and in dark."""
+    found = Axe().run(open_page(name, color_scheme=scheme)).response["violations"]
+    grave = [
+        (one["id"], one["nodes"][0]["html"])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+    assert grave == []
+
+
+def test_the_colour_scheme_is_the_readers(open_page: Open) -> None:
+    """The page's ground is light or dark, as the reader's system is."""
+
+    def ground(scheme: str) -> int:
+        page = open_page("index", color_scheme=scheme)
+        colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        return sum(map(int, colour[4:-1].split(",")))
+
+    assert ground("dark") < 200 < 600 < ground("light")
+
+
+def test_links_lead_somewhere(site: Path) -> None:
+    """Every link of every page leads to a file of the site and, in a page, to an existing place."""
+    places = {
+        path: {one["id"] for one in soup(path).find_all(id=True)} for path in site.rglob("*.html")
+    }
+    lost = []
+    for path in places:
+        for link in soup(path).find_all("a", href=True):
+            target = urlparse(str(link["href"]))
+            if target.scheme:
+                continue
+            file = (path.parent / unquote(target.path)).resolve() if target.path else path
+            known = places.get(file)
+            if not file.exists() or (target.fragment and known and target.fragment not in known):
+                lost.append((path.name, link["href"]))
+    assert lost == []
+
+
+def test_code_that_is_named_is_linked(site: Path) -> None:
+    """Every function that a page names leads to its entry in the reference."""
+    for name in READ:
+        if name.startswith("api/"):
+            continue
+        for code in soup(site / f"{name}.html").select("code.py"):
+            assert code.find_parent("a") is not None, (name, code.get_text())
+
+
+def soup(path: Path) -> BeautifulSoup:
+    """Parse a page."""
+    return BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
+
+
+def test_every_figure_has_what_stands_under_it(site: Path) -> None:
+    """Seed, run time, data, notebook and code are under each figure of each experiment."""
+    for name in (*PLAYERS, "notebooks/claims", "notebooks/sensitivity"):
+        figures = soup(site / f"{name}.html").select("main figure")
+        assert figures
+        for figure in figures:
+            text = figure.get_text(" ", strip=True)
+            for part in ("seed = ", "run time of the notebook", "CSV", "notebook", "code"):
+                assert part in text, (name, text)
+
+
+# --- the players -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PLAYERS)
+def test_a_player_works_by_mouse(open_page: Open, name: str) -> None:
+    """Next, last, first, play and pause do what they say, and the picture changes with them."""
+    page = open_page(name)
+    player = page.locator(".animation").first
+    picture, slider = player.locator("img"), player.locator("input[type=range]")
+
+    def press(button: str) -> None:
+        player.get_by_role("button", name=button, exact=True).click()
+
+    first = picture.get_attribute("src")
+    press("Next frame")
+    assert slider.input_value() == "1"
+    assert picture.get_attribute("src") != first
+    press("Last frame")
+    assert slider.input_value() == slider.get_attribute("max")
+    press("First frame")
+    assert picture.get_attribute("src") == first
+    press("Play")
+    page.wait_for_function("one => one.value >= 2", arg=slider.element_handle())
+    press("Pause")
+    stopped = slider.input_value()
+    page.wait_for_timeout(800)
+    assert slider.input_value() == stopped
+
+
+@pytest.mark.parametrize("name", PLAYERS)
+def test_a_player_works_by_keyboard(open_page: Open, name: str) -> None:
+    """The arrow keys step on the slider, and the space bar presses a button that has the focus."""
+    page = open_page(name)
+    player = page.locator(".animation").first
+    picture, slider = player.locator("img"), player.locator("input[type=range]")
+    slider.focus()
+    first = picture.get_attribute("src")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert slider.input_value() == "2"
+    assert picture.get_attribute("src") != first
+    page.keyboard.press("Home")
+    assert picture.get_attribute("src") == first
+    player.get_by_role("button", name="Play", exact=True).focus()
+    page.keyboard.press("Space")
+    page.wait_for_function("one => one.value >= 2", arg=slider.element_handle())
+
+
+def test_players_show_the_methods_side_by_side(open_page: Open) -> None:
+    """The words of a player name each method and how many iterations it takes."""
+    text = open_page("notebooks/open_maze").locator(".animation img").first.get_attribute("alt")
+    assert text is not None
+    assert "side by side" in text
+    for method in ("AdaBoost-IRL (R1)", "without incorrect", "with incorrect"):
+        assert method in text
+
+
+# --- tables ----------------------------------------------------------------------------------
+
+
+def column(page: Page, number: int) -> list[str]:
+    """Return a column of the first table."""
+    found: list[str] = page.evaluate(
+        "n => [...document.querySelectorAll('table.sortable')[0].tBodies[0].rows].map(row =>"
+        " row.cells[n].dataset.sort ?? row.cells[n].textContent.trim())",
+        number,
+    )
+    return found
+
+
+@pytest.mark.parametrize("by", ["mouse", "keyboard"])
+def test_tables_sort(open_page: Open, by: str) -> None:
+    """A click on a head, or Enter, sorts by its numbers, down and then up."""
+    page = open_page("notebooks/open_maze")
+    head = page.locator("table.sortable").first.locator("th", has_text="iterations")
+    number = head.evaluate("one => one.cellIndex")
+    before = [float(one) for one in column(page, number)]
+    assert before != sorted(before)
+    for order in (sorted(before, reverse=True), sorted(before)):
+        if by == "mouse":
+            head.click()
+        else:
+            head.focus()
+            page.keyboard.press("Enter")
+        page.wait_for_timeout(100)
+        assert [float(one) for one in column(page, number)] == order
+
+
+def test_every_table_can_be_taken_away(open_page: Open) -> None:
+    """The link below a table downloads it as CSV."""
+    page = open_page("index")
+    with page.expect_download() as download:
+        page.locator("a.table-csv").first.click()
+    text = Path(download.value.path()).read_text(encoding="utf-8")
+    assert text.startswith('"Claim","Paper"')
+    assert text.count("\n") == page.locator("table").first.locator("tr").count()
+
+
+# --- weight and paper ------------------------------------------------------------------------
+
+
+def test_the_site_is_light(open_page: Open, site: Path) -> None:
+    """All pages weigh under 30 MB, and each under 5 MB with what it loads."""
+    every = [path for path in site.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in every) < 30_000_000
+    for name in READ:
+        page = open_page(name)
+        loaded = page.evaluate("performance.getEntriesByType('resource').map(one => one.name)")
+        files = {Path(unquote(urlparse(one).path)) for one in loaded if one.startswith("file:")}
+        size = sum(file.stat().st_size for file in files | {site / f"{name}.html"})
+        assert size < SMALL, f"{name} weighs {size} bytes"
+
+
+def test_pages_can_be_printed(open_page: Open) -> None:
+    """A page becomes a PDF of some pages, in which nothing that only works on a screen is left."""
+    page = open_page("notebooks/open_maze")
+    assert len(page.pdf()) > 100_000
+    page.emulate_media(media="print")
+    assert not page.locator(".anim-controls").first.is_visible()
+
+
+def test_no_server_is_needed(site: Path) -> None:
+    """Nothing in the site names a file by an absolute path of the machine that built it."""
+    here = os.fsencode(PROJECT)
+    assert [
+        path for path in site.rglob("*.*") if path.is_file() and here in path.read_bytes()
+    ] == []

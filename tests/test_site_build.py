@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import papermill
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from replication import execution, paths
+from replication.files import write_file
+from replication.notebooks import Notebook, RunError
+from replication.regenerate import run_notebooks
+from replication.site import SiteError, build, build_site
+from replication.verification import verify_outputs
+
+CONF = """
+extensions = ["myst_nb"]
+nb_execution_mode = "off"
+exclude_patterns = ["_generated", "source"]
+"""
+INDEX = "# Toy report\n\n{text}\n\n```{{toctree}}\nnotebooks/toy\n```\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Set up a project with a notebook, its published outputs and a page of prose."""
+
+    def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
+        for name in notebook.outputs:
+            (stage / name).write_text(notebook.name)
+        write_file(executed, str(nbformat.writes(notebook.node)))
+
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(execution, "execute", execute)
+    monkeypatch.setattr(papermill, "execute_notebook", lambda *_, **__: pytest.fail("executed"))
+    monkeypatch.setattr(build, "_overview", lambda out: {"verdicts": "all\n"})
+    write_file(tmp_path / "docs" / "conf.py", CONF)
+    write_file(tmp_path / "docs" / "index.md", INDEX.format(text="Some prose."))
+    write_file(tmp_path / "README.md", "[table](figures/toy_table.md)")
+    (tmp_path / "environment.lock").touch()
+    write(tmp_path)
+    run(tmp_path)
+    return tmp_path
+
+
+def write(project: Path, code: str = "x = 1", prose: str = "# A toy") -> Path:
+    """Write the notebook."""
+    parameters = new_code_cell('out = "x"', metadata={"tags": ["parameters"]})
+    cells = [new_markdown_cell(prose), parameters, new_code_cell(code)]
+    metadata = {
+        "language_info": {"name": "python"},
+        "replication": {"outputs": ["toy_table.csv"]},
+    }
+    path = project / "notebooks" / "toy.ipynb"
+    path.parent.mkdir(exist_ok=True)
+    nbformat.write(new_notebook(cells=cells, metadata=metadata), path)
+    return path
+
+
+def run(project: Path, **options: Any) -> None:
+    """Run the notebook into `figures`."""
+    notebook = project / "notebooks" / "toy.ipynb"
+    run_notebooks([notebook], profile="paper", out=project / "figures", **options)
+
+
+def built(project: Path) -> str:
+    """Build the site; return its page of the notebook."""
+    first = build_site([project / "notebooks" / "toy.ipynb"], project / "site")
+    assert first == project / "site" / "index.html"
+    return (project / "site" / "notebooks" / "toy.html").read_text(encoding="utf-8")
+
+
+def test_nothing_is_executed(project: Path) -> None:
+    """The site has the notebook's page and that of the prose, from what was published."""
+    assert "A toy" in built(project)
+    assert "Some prose." in (project / "site" / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_stale_notebook_stops_the_build(project: Path) -> None:
+    """What is not up to date is named, with the reason and what to do; the old site stays."""
+    built(project)
+    before = (project / "site" / "index.html").read_bytes()
+    write(project, code="x = 2")
+    why = "the notebook's code has changed"
+    with pytest.raises(SiteError, match=f"toy is stale: {why}; first: replicate run toy"):
+        built(project)
+    assert (project / "site" / "index.html").read_bytes() == before
+
+
+def test_a_failed_notebook_stops_the_build(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a run that failed, there is no site that looks as if nothing had happened."""
+
+    def fail(notebook: Notebook, *_: Any, executed: Path, **__: Any) -> None:
+        write_file(executed, str(nbformat.writes(notebook.node)))
+        raise RunError("it failed")
+
+    monkeypatch.setattr(execution, "execute", fail)
+    with pytest.raises(RunError):
+        run(project, force=True)
+    with pytest.raises(SiteError, match="toy is stale: its last run did not finish"):
+        built(project)
+
+
+def test_a_missing_notebook_stops_the_build(project: Path) -> None:
+    """Without any outputs the notebook is named, too."""
+    shutil.rmtree(project / "figures")
+    with pytest.raises(SiteError, match="toy is missing; first: replicate run toy"):
+        built(project)
+
+
+def test_new_text_is_taken_over(project: Path) -> None:
+    """Prose of a notebook reaches its page without a run, and the manifest stays true."""
+    built(project)
+    write(project, prose="# A game")
+    assert "A game" in built(project)
+    assert list(verify_outputs(project / "figures")) == []
+
+
+def test_only_what_changed_is_written(project: Path) -> None:
+    """New prose on one page leaves the files of the others alone, and an equal build leaves all."""
+    built(project)
+    source, html = (project / "build" / "site-work" / part for part in ("source", "html"))
+    before = {path: path.stat().st_mtime_ns for path in source.rglob("*.*")}
+    page = (html / "notebooks" / "toy.html").stat().st_mtime_ns
+    (project / "docs" / "index.md").write_text(INDEX.format(text="Other prose."))
+    built(project)
+    changed = {path.name for path, stamp in before.items() if path.stat().st_mtime_ns != stamp}
+    assert changed == {"index.md"}
+    assert (html / "notebooks" / "toy.html").stat().st_mtime_ns == page
+    assert "Other prose." in (project / "site" / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_new_title_reaches_every_page(project: Path) -> None:
+    """Where titles or their order change, all pages are written: each shows them at its side."""
+    built(project)
+    text = INDEX.format(text="Some prose.").replace("Toy report", "Other report")
+    (project / "docs" / "index.md").write_text(text)
+    assert "Other report" in built(project)
+
+
+def test_what_is_gone_leaves_the_site(project: Path) -> None:
+    """A page whose source was removed is not on the site any more."""
+    extra = project / "docs" / "extra.md"
+    extra.write_text("---\norphan: true\n---\n# Extra\n")
+    built(project)
+    assert (project / "site" / "extra.html").exists()
+    extra.unlink()
+    built(project)
+    assert not (project / "site" / "extra.html").exists()
+
+
+def test_a_broken_page_is_named(project: Path) -> None:
+    """A link that leads nowhere is one error with the page's name, and the old site stays."""
+    built(project)
+    (project / "docs" / "index.md").write_text(INDEX.format(text="[gone](nowhere.md)"))
+    with pytest.raises(SiteError, match=r"the pages cannot be written: index\.md.*nowhere"):
+        built(project)
+    assert (project / "site" / "index.html").exists()
+    (project / "docs" / "index.md").write_text(INDEX.format(text="mended"))
+    built(project)
+
+
+def test_tables_of_the_readme_are_those_of_the_pages(project: Path) -> None:
+    """A link to a table in a file leads to the table on its page."""
+    built(project)
+    readme = project / "build" / "site-work" / "source" / "_generated" / "readme.md"
+    assert readme.read_text() == "[table](#result-toy-table)"
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_the_site_is_replaced_in_one_step(
+    project: Path, monkeypatch: pytest.MonkeyPatch, there: bool
+) -> None:
+    """If the new site cannot be copied, the one that is there stays whole."""
+    if there:
+        built(project)
+
+    def full(*_: object, **__: object) -> Callable[..., None]:
+        raise OSError(28, "No space left on device", "somewhere")
+
+    monkeypatch.setattr(shutil, "copytree", full)
+    with pytest.raises(OSError, match="No space left"):
+        built(project)
+    assert (project / "site" / "index.html").exists() == there
