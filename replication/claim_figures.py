@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from replication.calibration import CALIBRATED
 from replication.choices import Value
-from replication.claims import Claim
+from replication.claims import LABELS, Claim
 from replication.comparisons import F_LABELS
 from replication.figures import _figure, _legend_below, _settled
 from replication.paper import Published
@@ -39,24 +39,6 @@ SMALL = 6.8
 
 FAR = 8
 """How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""
-
-LABELS = {
-    "FASTER": "faster than AdaBoost-IRL",
-    "STEADIER": "steadier than AdaBoost-IRL",
-    "SAVES-OPEN": "saves iterations, open maze",
-    "SAVES-OBSTACLES": "saves iterations, obstacles",
-    "SAVES-SOCCER": "saves iterations, soccer",
-    "ZERO-OPEN": "error falls to zero, open maze",
-    "ZERO-OBSTACLES": "error falls to zero, obstacles",
-    "ZERO-SOCCER": "error falls to zero, soccer",
-    "AVOIDS-OPEN": "errs less at first, open maze",
-    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
-    "AVOIDS-SOCCER": "errs less at first, soccer",
-    "Q-GROWS": "Q grows along the path",
-    "Q-TO-GOAL": "Q grows toward the goal",
-    "REWARD-TO-GOAL": "reward grows toward the goal",
-}
-"""What each comparative claim says, in a few words."""
 
 UNITS = {
     ("mean-difference", "iterations"): "difference in iterations",

@@ -36,6 +36,24 @@ Statistic = Literal[
 TESTS = {"mean-difference": "signed-rank", "mean": "signed-rank", "sd-ratio": "brown-forsythe"}
 """The test that stands beside a statistic's interval; the others have none."""
 
+LABELS = {
+    "FASTER": "faster than AdaBoost-IRL",
+    "STEADIER": "steadier than AdaBoost-IRL",
+    "SAVES-OPEN": "saves iterations, open maze",
+    "SAVES-OBSTACLES": "saves iterations, obstacles",
+    "SAVES-SOCCER": "saves iterations, soccer",
+    "ZERO-OPEN": "error falls to zero, open maze",
+    "ZERO-OBSTACLES": "error falls to zero, obstacles",
+    "ZERO-SOCCER": "error falls to zero, soccer",
+    "AVOIDS-OPEN": "errs less at first, open maze",
+    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
+    "AVOIDS-SOCCER": "errs less at first, soccer",
+    "Q-GROWS": "Q grows along the path",
+    "Q-TO-GOAL": "Q grows toward the goal",
+    "REWARD-TO-GOAL": "reward grows toward the goal",
+}
+"""What each comparative claim says, in a few words."""
+
 
 class ClaimError(ValueError):
     """A file of claims that cannot be used; the message is one line."""

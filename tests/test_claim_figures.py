@@ -11,7 +11,6 @@ from matplotlib.text import Text
 
 from replication.calibration import CALIBRATED, PAIR, grid
 from replication.claim_figures import (
-    LABELS,
     OUTCOMES,
     UNITS,
     calibration_figure,
@@ -27,7 +26,7 @@ from replication.claim_figures import (
     shares_figure,
     single_figure,
 )
-from replication.claims import claims
+from replication.claims import LABELS, claims
 from replication.figures import save_figure
 from replication.sensitivity import outcome_shares
 from replication.specifications import declared, factorial_specifications, single_specifications
