@@ -255,7 +255,7 @@ def test_readable_verdicts_by_hand() -> None:
 def test_verdict_lines_have_the_verdict_first() -> None:
     """On a terminal there is a line a claim: verdict, the paper's value, ours, and the claim."""
     head, *found = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
-    assert head.split() == "verdict paper Fᵢ (printed) Fᵢ₊₁ (updated) claim".split()
+    assert head.split() == ["verdict", "paper", "Fᵢ", "(printed)", "Fᵢ₊₁", "(updated)", "claim"]
     assert re.split(r"  +", found[1]) == [
         "partly",
         "× 0.46",
