@@ -53,7 +53,18 @@ LABELS = {
     "Q-TO-GOAL": "Q grows toward the goal",
     "REWARD-TO-GOAL": "reward grows toward the goal",
 }
-"""What each comparative claim says, in a few words."""
+"""What each comparative claim says, in a few words, and on which task."""
+
+
+def short_label(id: str) -> str:
+    """Return what a claim says without its task, for where the task changes.
+
+    Examples
+    --------
+    >>> short_label("SAVES-OPEN")
+    'saves iterations'
+    """
+    return LABELS.get(id, id.lower()).partition(",")[0]
 
 
 class ClaimError(ValueError):

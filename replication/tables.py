@@ -291,6 +291,10 @@ def readable_outcomes(table: pd.DataFrame) -> pd.DataFrame:
     for name in ("specifications", "holds", "open", "reversed", "undefined"):
         readable[name.capitalize()] = table[name]
     readable["With capped trials"] = table["with_caps"]
+    readable["Holds in the others"] = [
+        f"{row.holds_uncapped} of {row.uncapped}" for row in table.itertuples()
+    ]
+    readable["As the default"] = table["unchanged"]
     readable["Effect: median (least, largest)"] = [
         f"{row.median:.2f} ({row.lowest:.2f}, {row.highest:.2f})" for row in table.itertuples()
     ]
@@ -324,6 +328,10 @@ def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
     readable["Median"] = table["median"].map("{:g}".format)
     readable["At the cap"] = [
         f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    ]
+    readable["More than the first [95 %]"] = [
+        _interval(*row)
+        for row in zip(table["more"], table["more_low"], table["more_high"], strict=True)
     ]
     return readable
 

@@ -298,14 +298,17 @@ def test_readable_outcomes_by_hand() -> None:
             "undefined": [0, 1],
             "share": [0.9, 0.8],
             "with_caps": [0, 7],
+            "uncapped": [44, 232],
+            "holds_uncapped": [40, 194],
+            "unchanged": [5, 0],
             "median": [-4.0, -3.456],
             "lowest": [-9.0, -20.0],
             "highest": [1.0, 2.5],
         }
     )
     assert readable_outcomes(table).to_numpy().tolist() == [
-        ["FASTER", "one at a time", 44, 40, 3, 1, 0, 0, "-4.00 (-9.00, 1.00)"],
-        ["FASTER", "all at once", 240, 200, 30, 9, 1, 7, "-3.46 (-20.00, 2.50)"],
+        ["FASTER", "one at a time", 44, 40, 3, 1, 0, 0, "40 of 44", 5, "-4.00 (-9.00, 1.00)"],
+        ["FASTER", "all at once", 240, 200, 30, 9, 1, 7, "194 of 232", 0, "-3.46 (-20.00, 2.50)"],
     ]
 
 
@@ -341,6 +344,9 @@ def test_readable_ablations_by_hand() -> None:
             "high": [42.0],
             "sd": [4.5],
             "median": [39.5],
+            "more": [1.0],
+            "more_low": [-0.5],
+            "more_high": [2.5],
         }
     )
     assert readable_ablations(table).iloc[0].tolist() == [
@@ -349,6 +355,7 @@ def test_readable_ablations_by_hand() -> None:
         "4.50",
         "39.5",
         "2 of 30",
+        "1.00 [-0.50, 2.50]",
     ]
 
 
