@@ -279,7 +279,7 @@ def findings_at_once(effects: pd.DataFrame, specifications: Sequence[Specificati
         largest = _choices_of(shares, row.claim).nlargest(1, "share")
         for one in largest[largest["share"] > MATTERS].itertuples():
             name = NAMES.get(one.choice, one.choice)
-            line += f" Most depends on {name}: {one.share:.0%} of the variance of the effect"
+            line += f" It depends most on {name}: {one.share:.0%} of the variance of the effect"
             left = _choices_of(without, row.claim).set_index("choice")["share"]
             if row.with_caps and one.choice in left.index:
                 line += f", {left[one.choice]:.0%} without trials at the cap"

@@ -330,8 +330,8 @@ def test_findings_count_with_and_without_caps() -> None:
     assert faster.startswith(
         "- **Faster than AdaBoost-IRL**: holds in 41 of 80 specifications (51%), is open in 39 and "
         "reversed in 0. In 40 of them trials end at the iteration cap, all of them of "
-        "AdaBoost-IRL; it holds in 1 of the 40 others. Most depends on the rule of AdaBoost-IRL: "
-        "100% of the variance of the effect, "
+        "AdaBoost-IRL; it holds in 1 of the 40 others. It depends most on the rule of "
+        "AdaBoost-IRL: 100% of the variance of the effect, "
     )
     assert faster.endswith("It holds with graded 100% (always at the cap), mismatch 2%.")
     assert "; every trial of the other method reaches zero, in every specification." in reaches
