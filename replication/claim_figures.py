@@ -354,7 +354,7 @@ def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
         panel.imshow(values, cmap=colours, vmin=0, vmax=1, aspect="auto")
         for (row, column), value in np.ndenumerate(values):
             said = "–" if np.isnan(value) else _number(round(100 * value))
-            said = "≥ 100" if columns[column] == "noise" and value >= 1 else said
+            said = "≥100" if columns[column] == "noise" and value >= 1 else said
             colour = "white" if value > 0.55 else "0.15" if abs(value) >= 0.005 else "0.65"
             panel.text(column, row, said, size=7, ha="center", va="center_baseline", color=colour)
         panel.set_xticks(range(len(columns)), columns, size=SMALL, rotation=90)
@@ -514,17 +514,16 @@ def numbers_figure(table: pd.DataFrame, published: float) -> Figure:
 
 
 def describe_numbers(table: pd.DataFrame) -> str:
-    """Return in words what the most marked pairs save, and which number saves most."""
+    """Return in words what the most marked pairs save."""
     parts = []
     for f, own in table.groupby("F", sort=False):
-        last = own.loc[own["pairs"].idxmax()]
-        most = own.loc[own["saved"].idxmax()]
+        most = own.loc[own["pairs"].idxmax()]
         parts.append(
-            f"under {F_LABELS[f]} {last['saved']:.1f} [{last['saved_low']:.1f}, "
-            f"{last['saved_high']:.1f}] iterations with {last['pairs']} marked pairs; the most, "
-            f"{most['saved']:.1f}, with {most['pairs']}"
+            f"{most['saved']:.1f} [{most['saved_low']:.1f}, {most['saved_high']:.1f}] iterations "
+            f"under {F_LABELS[f]}"
         )
-    return f"Saved against no incorrect demonstration: {'. '.join(parts)}."
+    pairs = table["pairs"].max()
+    return f"With the most marked pairs, {pairs}, incorrect demonstrations save {', '.join(parts)}."
 
 
 # --- what they share -----------------------------------------------------------------------------
