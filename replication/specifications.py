@@ -136,9 +136,10 @@ def check_declared() -> None:
         ("mazes.factorial", plan.mazes.factorial.choices, "open-maze"),
         ("soccer.single", plan.soccer.single.choices, "soccer"),
     ):
+        demos = load_demos(resolve(EXPERIMENTS[task].demos))
         for kinds in table.get("INCORRECT-KINDS", ()):
             try:
-                load_demos(resolve(EXPERIMENTS[task].demos)).select(str(kinds))
+                demos.select(str(kinds))
             except DemoError as error:
                 raise ChoiceError(f"specifications.toml, {place}: {error}") from None
 

@@ -16,6 +16,7 @@ from replication.measures import measure_trials
 from replication.paths import PROJECT
 from replication.sensitivity import (
     HOLDS,
+    NAMES,
     OPEN,
     REVERSED,
     UNDEFINED,
@@ -387,6 +388,11 @@ def test_findings_say_what_one_choice_moves() -> None:
         "One choice at a time, mazes:",
         "One choice at a time, soccer:",
     ]
+
+
+def test_every_choice_of_the_factorial_has_a_name() -> None:
+    """A choice that is added to the factorial has to be named in words, too."""
+    assert set(NAMES) == set(declared().mazes.factorial.choices)
 
 
 def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
