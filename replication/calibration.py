@@ -7,20 +7,22 @@ nearest to its published mean and SD on the open maze. ``choices.toml`` states t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import product
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 
 from replication.choices import Value, register
+from replication.comparisons import F_LABELS
 from replication.envs.maze import Maze
 from replication.expert import demonstrate
 from replication.paper import TABLE_1, Published
 from replication.params import Expert, Params
 from replication.setting import Setting
-from replication.statistics import mean_prediction, summarise
+from replication.statistics import mean_prediction, sd_interval, sd_prediction, summarise
 from replication.trials import Results
 
 CALIBRATED = ("DEMO-SHAPE", "ALPHA", "F-START", "TIES")
@@ -133,3 +135,88 @@ def calibration_table(results: Results, settings: Mapping[Point, Setting]) -> pd
             }
         )
     return pd.DataFrame(rows).sort_values("divergence", kind="stable", ignore_index=True)
+
+
+def check_table(runs: Iterable[tuple[str, str, NDArray[np.float64]]]) -> pd.DataFrame:
+    """Return how near the chosen point comes to the pair in each of some runs.
+
+    Parameters
+    ----------
+    runs
+        What the trials are, the reading of Eq. 9, and the iterations of each trial.
+
+    Returns
+    -------
+    DataFrame
+        Mean and SD with their intervals, and where both would lie if the trials came from the
+        published distribution, as for the claims about published numbers.
+    """
+    rows = []
+    for what, f, counts in runs:
+        own = summarise(counts, np.ones(len(counts)))
+        sd_low, sd_high = sd_interval(counts)
+        mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, own.n)
+        sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
+        rows.append(
+            {
+                "trials": what,
+                "F": f,
+                "n": own.n,
+                "mean": own.mean,
+                "low": own.low,
+                "high": own.high,
+                "predicted_low": mean_from,
+                "predicted_high": mean_to,
+                "sd": own.sd,
+                "sd_low": sd_low,
+                "sd_high": sd_high,
+                "sd_predicted_low": sd_from,
+                "sd_predicted_high": sd_to,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def readable_check(check: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of :func:`check_table` as a reader wants it."""
+    rows = []
+    for row in check.itertuples():
+        rows.append(
+            {
+                "Trials": f"{row.n}, {row.trials}",
+                "F": F_LABELS[row.F],
+                "Mean [95 %]": f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]",
+                "Due": f"{row.predicted_low:.2f} to {row.predicted_high:.2f}",
+                "SD [95 %]": f"{row.sd:.2f} [{row.sd_low:.2f}, {row.sd_high:.2f}]",
+                "SD due": f"{row.sd_predicted_low:.2f} to {row.sd_predicted_high:.2f}",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def check_findings(check: pd.DataFrame) -> str:
+    """Return in words whether the chosen point keeps its nearness in new trials.
+
+    Parameters
+    ----------
+    check
+        Of :func:`check_table`: the grid's own trials, new ones, and new ones of the other reading.
+    """
+    old, new, other = check.itertuples()
+    mean = new.predicted_low <= new.mean <= new.predicted_high
+    sd = new.sd_predicted_low <= new.sd <= new.sd_predicted_high
+    lie = {
+        (True, True): "both lie where those of the published distribution would",
+        (True, False): "the mean lies where it would come from the published distribution, "
+        "the SD does not",
+        (False, True): "the SD lies where it would come from the published distribution, "
+        "the mean does not",
+        (False, False): "neither lies where it would come from the published distribution",
+    }[mean, sd]
+    return (
+        f"In the {old.n} trials of the grid the chosen point has a mean of {old.mean:.2f} "
+        f"(SD {old.sd:.2f}); in {new.n} new ones, {new.mean:.2f} ({new.sd:.2f}): {lie}. To take "
+        f"the best of {len(grid())} points, each known from {old.n} trials only, is to take a "
+        f"lucky one, and luck does not last. Only {F_LABELS[new.F]} was calibrated. "
+        f"{F_LABELS[other.F]} inherits the point, and has {other.mean:.2f} ({other.sd:.2f})."
+    )

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from replication.calibration import CALIBRATED
 from replication.choices import Value
-from replication.claims import Claim
+from replication.claims import LABELS, Claim, short_label
 from replication.comparisons import F_LABELS
 from replication.figures import _figure, _legend_below, _settled
 from replication.paper import Published
-from replication.sensitivity import HOLDS, OPEN, REVERSED, UNDEFINED
+from replication.sensitivity import HOLDS, OPEN, REVERSED, UNDEFINED, unchanged
 from replication.specifications import Specification, default_of
 from replication.verdicts import REPRODUCED, by_claim, overall
 from replication.verdicts import REVERSED as VERDICT_REVERSED
@@ -39,24 +39,6 @@ SMALL = 6.8
 
 FAR = 8
 """How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""
-
-LABELS = {
-    "FASTER": "faster than AdaBoost-IRL",
-    "STEADIER": "steadier than AdaBoost-IRL",
-    "SAVES-OPEN": "saves iterations, open maze",
-    "SAVES-OBSTACLES": "saves iterations, obstacles",
-    "SAVES-SOCCER": "saves iterations, soccer",
-    "ZERO-OPEN": "error falls to zero, open maze",
-    "ZERO-OBSTACLES": "error falls to zero, obstacles",
-    "ZERO-SOCCER": "error falls to zero, soccer",
-    "AVOIDS-OPEN": "errs less at first, open maze",
-    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
-    "AVOIDS-SOCCER": "errs less at first, soccer",
-    "Q-GROWS": "Q grows along the path",
-    "Q-TO-GOAL": "Q grows toward the goal",
-    "REWARD-TO-GOAL": "reward grows toward the goal",
-}
-"""What each comparative claim says, in a few words."""
 
 UNITS = {
     ("mean-difference", "iterations"): "difference in iterations",
@@ -134,7 +116,7 @@ def _draw_verdicts(panel: Axes, part: pd.DataFrame) -> None:
             _beside(panel, row.verdict, 1, at + place, 5, color=told, weight=bold)
         panel.plot(rows["paper"].iloc[0], at, "v", ms=6, mfc="none", mec="0.3", zorder=5)
     panel.set(yticks=range(len(ids)), ylim=(len(ids) - 0.5, -0.5))
-    panel.set_yticklabels([f"{_short(id)}\n{id}" for id in ids], size=SMALL)
+    panel.set_yticklabels([f"{LABELS.get(id, id)}\n{id}" for id in ids], size=SMALL)
     panel.tick_params(axis="x", labelsize=SMALL, pad=2)
     panel.tick_params(axis="y", length=0)
     panel.spines["left"].set_visible(False)
@@ -181,9 +163,10 @@ def curve_figure(
     (top, corner), (matrix, shares) = grid
     _draw_curve(top, part, claim)
     corner.set_axis_off()
-    for effect in _default(effects, claim)["effect"].dropna():
-        top.axhline(effect, color="0.1", lw=1, ls=(0, (4, 2)), zorder=5)
-        corner.text(0, effect, f"default\n{_number(effect)}", size=7, va="center")
+    for row in _default(effects, claim).dropna(subset="effect").itertuples():
+        top.axhline(row.effect, color="0.1", lw=1, ls=(0, (4, 2)), zorder=5)
+        said = f"default\n{_number(row.effect)}\n({row.n} trials)"
+        corner.text(0, row.effect, said, size=7, va="center")
     x, outcome = np.arange(len(part)), part["outcome"].to_numpy()
     for at, (id, value) in zip(y, rows, strict=True):
         on = np.array([chosen[name][id] == value for name in part["specification"]])
@@ -203,7 +186,9 @@ def curve_figure(
         panel.tick_params(left=False, labelleft=False)
         panel.xaxis.label.set_size(7.5)
     margin = f"margin ({_number(claim.margin)})"
-    _legend_below(figure, _outcome_handles("o", margin, capped=bool((part["capped"] > 0).any())))
+    handles = _outcome_handles("o", margin, capped=bool((part["capped"] > 0).any()))
+    handles.append(_handle("holds, over all", "", OUTCOMES[HOLDS], lw=0.8, ls=":"))
+    _legend_below(figure, handles)
     return figure
 
 
@@ -213,7 +198,8 @@ def describe_curve(
     """Return in words in how many specifications a claim holds, and how far its effects reach."""
     part = _sorted_effects(effects, specifications, claim)
     said = (
-        f"{claim.id} holds in {_holding(part)}; it is {_counted(part)}. Effects run from "
+        f"{claim.id} holds in {_holding(part)}; it is {_counted(part)}"
+        f"{_without_caps(part).replace(chr(10), '; ')}. Effects run from "
         f"{part['effect'].min():.3g} to {part['effect'].max():.3g}"
     )
     for row in _default(effects, claim).itertuples():
@@ -248,8 +234,11 @@ def _draw_curve(panel: Axes, part: pd.DataFrame, claim: Claim) -> None:
                 some.index, some["effect"], "o", ms=2.6, mew=0.7, mec=colour, mfc=face, zorder=4
             )
     panel.set_xlim(-1.5, len(part) + 0.5)
-    panel.set_ylabel(f"{UNITS[claim.statistic, claim.measure]}\n(95 % interval)")
-    panel.set_title(f"{claim.id}: {_said(claim.id)}", loc="left")
+    axis = ", symmetric log axis" if panel.get_yscale() == "symlog" else ""
+    panel.set_ylabel(f"{UNITS[claim.statistic, claim.measure]}\n(95 % interval{axis})")
+    several = "MAP=" in part["specification"].iloc[0]
+    title = f"{short_label(claim.id)}{', on all maps' if several else ''} ({claim.id})"
+    panel.set_title(title, loc="left")
     panel.tick_params(axis="x", bottom=False)
     # The curve rises: its upper left and lower right are free, one of them more than the other.
     low, high, effect = _finite(panel, part[["low", "high", "effect"]].to_numpy(float))
@@ -261,7 +250,7 @@ def _draw_curve(panel: Axes, part: pd.DataFrame, claim: Claim) -> None:
         place, side = ((0.985, 0.04), ("right", "bottom"))
     panel.text(
         *place,
-        f"holds in {_holding(part)}\n{_counted(part)}",
+        f"holds in {_holding(part)}\n{_counted(part)}{_without_caps(part)}",
         transform=panel.transAxes,
         ha=side[0],
         va=side[1],
@@ -301,9 +290,13 @@ def single_figure(effects: pd.DataFrame, claims: Sequence[Claim]) -> Figure:
             face = "white" if row.capped else colour
             panel.hlines(row.y, row.low, row.high, color=colour, lw=1.3)
             panel.plot(row.effect, row.y, MARKS[row.outcome], ms=3.4, mec=colour, mfc=face)
+        for row in part[part["outcome"] == UNDEFINED].itertuples():
+            _beside(panel, UNDEFINED, 0, row.y, 2, color="0.35")
         width = 78 // len(claims)
-        panel.set_title(textwrap.fill(_said(claim.id), width) + f"\n{claim.id}", size=7.5)
-        panel.set_xlabel(textwrap.fill(UNITS[claim.statistic, claim.measure], width), size=7.5)
+        panel.set_title(textwrap.fill(short_label(claim.id), width) + f"\n{claim.id}", size=7.5)
+        axis = ", symmetric log axis" if panel.get_xscale() == "symlog" else ""
+        unit = UNITS[claim.statistic, claim.measure] + axis
+        panel.set_xlabel(textwrap.fill(unit, width), size=7.5)
         panel.tick_params(axis="x", labelsize=SMALL)
         panel.tick_params(axis="y", left=False, labelleft=False)
         panel.spines["left"].set_visible(False)
@@ -324,7 +317,8 @@ def describe_single(effects: pd.DataFrame, claims: Sequence[Claim]) -> str:
         (start,), others = own.loc[default, "outcome"], own[~default]
         parts.append(
             f"{claim.id} {start if start == HOLDS else 'is ' + start} by default; with one choice "
-            f"changed it holds in {_holding(others)}, is {_counted(others)}"
+            f"changed it holds in {_holding(others)}, is {_counted(others)}; "
+            f"{int(unchanged(own).sum())} of them have the numbers of the default"
         )
     return f"{'. '.join(parts)}."
 
@@ -360,6 +354,7 @@ def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
         panel.imshow(values, cmap=colours, vmin=0, vmax=1, aspect="auto")
         for (row, column), value in np.ndenumerate(values):
             said = "–" if np.isnan(value) else _number(round(100 * value))
+            said = "≥100" if columns[column] == "noise" and value >= 1 else said
             colour = "white" if value > 0.55 else "0.15" if abs(value) >= 0.005 else "0.65"
             panel.text(column, row, said, size=7, ha="center", va="center_baseline", color=colour)
         panel.set_xticks(range(len(columns)), columns, size=SMALL, rotation=90)
@@ -369,7 +364,8 @@ def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
         panel.grid(which="minor", color="white", lw=1.5)
         panel.tick_params(which="both", length=0)
         panel.spines[:].set_visible(False)
-    axes[0].set_yticks(range(len(grid)), [f"{_short(id)}\n{id}" for id in grid.index], size=SMALL)
+    labels = [f"{short_label(id)}\n{id}" for id in grid.index]
+    axes[0].set_yticks(range(len(grid)), labels, size=SMALL)
     axes[0].set_xlabel("share of the effect's variance (%)", size=7.5)
     start = np.zeros(len(grid))
     defined = outcomes["specifications"] - outcomes[UNDEFINED]
@@ -482,62 +478,55 @@ def _label_in_free_corner(panel: Axes, table: pd.DataFrame, row: pd.Series) -> N
 
 
 @_settled
-def numbers_figure(table: pd.DataFrame) -> Figure:
-    """Draw the mean iterations against the number of marked pairs.
+def numbers_figure(table: pd.DataFrame, published: float) -> Figure:
+    """Draw the iterations saved against the number of marked pairs.
 
     Parameters
     ----------
     table
-        One row for each number of demonstrations and reading: `F`, `number`, `pairs`, `mean`, and
-        its interval `low` to `high`.
+        One row for each number of demonstrations and reading: `F`, `number`, `pairs`, and the mean
+        number of iterations `saved`, with its interval `saved_low` to `saved_high`.
+    published
+        The published saving.
     """
     figure, (panel,) = _figure(1, 1, height=3.4)
     pairs = table.drop_duplicates("pairs").sort_values("pairs")
     linear = float(pairs["pairs"][pairs["pairs"] > 0].min())
     panel.set_xscale("symlog", linthresh=linear, linscale=0.3)
+    panel.axhline(0, color="0.25", lw=1)
+    panel.axhline(published, color="0.3", lw=1, ls=(0, (4, 2)))
     for f, own in table.groupby("F", sort=False):
         mark, colour = READINGS[f]
         own = own.sort_values("pairs")
-        panel.axhline(own["mean"].iloc[0], color=colour, lw=0.8, ls=":")
-        panel.fill_between(own["pairs"], own["low"], own["high"], color=colour, alpha=0.15, lw=0)
-        panel.plot(own["pairs"], own["mean"], color=colour, marker=mark, ms=4.5)
+        low, high = own["saved_low"], own["saved_high"]
+        panel.fill_between(own["pairs"], low, high, color=colour, alpha=0.15, lw=0)
+        panel.plot(own["pairs"], own["saved"], color=colour, marker=mark, ms=4.5)
     panel.set_xticks(pairs["pairs"], [f"{r.pairs}\n({r.number})" for r in pairs.itertuples()])
     panel.xaxis.set_minor_locator(NullLocator())
     panel.tick_params(axis="x", labelsize=7.5)
-    panel.set(xlabel="marked pairs of state and action (incorrect demonstrations)")
-    panel.set(ylabel="mean of the iterations")
+    panel.set(xlabel="marked pairs of state and action (incorrect demonstrations), log axis")
+    panel.set(ylabel="iterations saved, same seeds")
     handles = _reading_handles(table)
     handles.append(Patch(color="0.4", alpha=0.25, lw=0, label="95 % interval of the mean"))
-    handles.append(_handle("without any", "", "0.4", lw=0.8, ls=":"))
+    handles.append(_handle("the paper's saving", "", "0.3", lw=1, ls=(0, (4, 2))))
     _legend_below(figure, handles)
     return figure
 
 
 def describe_numbers(table: pd.DataFrame) -> str:
-    """Return in words how the mean changes from no marked pair to the most."""
+    """Return in words what the most marked pairs save."""
     parts = []
     for f, own in table.groupby("F", sort=False):
-        own = own.sort_values("pairs")
-        first, last = own.iloc[0], own.iloc[-1]
-        least = own.loc[own["mean"].idxmin()]
+        most = own.loc[own["pairs"].idxmax()]
         parts.append(
-            f"under {F_LABELS[f]} from {first['mean']:.1f} with {first['pairs']} marked pairs to "
-            f"{last['mean']:.1f} with {last['pairs']}, least {least['mean']:.1f} with "
-            f"{least['pairs']}"
+            f"{most['saved']:.1f} [{most['saved_low']:.1f}, {most['saved_high']:.1f}] iterations "
+            f"under {F_LABELS[f]}"
         )
-    return f"The mean of the iterations goes {'; '.join(parts)}."
+    pairs = table["pairs"].max()
+    return f"With the most marked pairs, {pairs}, incorrect demonstrations save {', '.join(parts)}."
 
 
 # --- what they share -----------------------------------------------------------------------------
-
-
-def _short(id: str) -> str:
-    return LABELS.get(id, id.lower())
-
-
-def _said(id: str) -> str:
-    """Return what a claim says without its task, which specifications change."""
-    return _short(id).partition(",")[0]
 
 
 def _order(value: Value) -> tuple[bool, float, str]:
@@ -552,6 +541,16 @@ def _number(value: float) -> str:
 def _holding(part: pd.DataFrame) -> str:
     holds = int((part["outcome"] == HOLDS).sum())
     return f"{holds} of {len(part)} specifications ({100 * holds / len(part):.0f} %)"
+
+
+def _without_caps(part: pd.DataFrame) -> str:
+    """Say in how many specifications without a trial at the cap a claim holds, if others exist."""
+    some = part[part["capped"] == 0]
+    if len(some) in (0, len(part)):
+        return ""
+    holds = int((some["outcome"] == HOLDS).sum())
+    share = 100 * holds / len(some)
+    return f"\nwithout trials at the cap: holds in {holds} of {len(some)} ({share:.0f} %)"
 
 
 def _counted(part: pd.DataFrame) -> str:

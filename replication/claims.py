@@ -12,13 +12,14 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from replication.choices import unknown_name
 from replication.irl import METHODS
 from replication.paper import Published
+from replication.statistics import CONFIDENCE
 
 TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
 Reading = Literal["printed", "updated"]
@@ -35,6 +36,35 @@ Statistic = Literal[
 
 TESTS = {"mean-difference": "signed-rank", "mean": "signed-rank", "sd-ratio": "brown-forsythe"}
 """The test that stands beside a statistic's interval; the others have none."""
+
+LABELS = {
+    "FASTER": "faster than AdaBoost-IRL",
+    "STEADIER": "steadier than AdaBoost-IRL",
+    "SAVES-OPEN": "saves iterations, open maze",
+    "SAVES-OBSTACLES": "saves iterations, obstacles",
+    "SAVES-SOCCER": "saves iterations, soccer",
+    "ZERO-OPEN": "error falls to zero, open maze",
+    "ZERO-OBSTACLES": "error falls to zero, obstacles",
+    "ZERO-SOCCER": "error falls to zero, soccer",
+    "AVOIDS-OPEN": "errs less at first, open maze",
+    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
+    "AVOIDS-SOCCER": "errs less at first, soccer",
+    "Q-GROWS": "Q grows along the path",
+    "Q-TO-GOAL": "Q grows toward the goal",
+    "REWARD-TO-GOAL": "reward grows toward the goal",
+}
+"""What each comparative claim says, in a few words, and on which task."""
+
+
+def short_label(id: str) -> str:
+    """Return what a claim says without its task, for where the task changes.
+
+    Examples
+    --------
+    >>> short_label("SAVES-OPEN")
+    'saves iterations'
+    """
+    return LABELS.get(id, id.lower()).partition(",")[0]
 
 
 class ClaimError(ValueError):
@@ -82,6 +112,8 @@ class Claim(_Strict):
             raise ValueError(f"paper.{self.x} is missing")
         if self.statistic in ("mean-difference", "sd-ratio") and not self.y:
             raise ValueError(f"{self.statistic!r} needs y")
+        if self.x == self.y:
+            raise ValueError(f"x and y are both {self.x!r}; name two methods")
         if self.paper and self.y and not {self.x, self.y} <= set(self.paper):
             raise ValueError(f"paper has to have both {self.x!r} and {self.y!r}, or neither")
         return self
@@ -106,12 +138,21 @@ class Claim(_Strict):
 class Judging(_Strict):
     """What holds for all claims: the judging run, and the criterion's numbers."""
 
-    root_seed: int
-    fewest: int
+    root_seed: Annotated[int, Field(ge=0)]
+    fewest: Annotated[int, Field(ge=2)]
     confidence: float
-    level: float
+    level: Annotated[float, Field(gt=0, lt=1)]
     readings: tuple[Reading, ...]
-    trials: Mapping[TaskName, int]
+    trials: Mapping[TaskName, Annotated[int, Field(ge=2)]]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.confidence != CONFIDENCE:
+            raise ValueError(
+                f"all intervals have a confidence of {CONFIDENCE}, not {self.confidence}; "
+                "change it in replication/statistics.py, too"
+            )
+        return self
 
 
 class Explored(_Strict):

@@ -181,6 +181,8 @@ def run_notebooks(
         If a notebook cannot be run, a parameter is unknown or of the wrong type, or `figures`
         would take another run's results; nothing ran. Also if a cell refuses a choice, a map or
         demonstrations: then earlier notebooks ran.
+    ClaimError, ChoiceError
+        If the claims or the specifications that a notebook reads cannot be used; nothing ran.
     RunError
         If a cell failed, took too long or killed its kernel, or if the files in `out` are not the
         declared ones or cannot be written.
@@ -222,9 +224,23 @@ def run_notebooks(
                 waiting.append(run)
         if not waiting:
             return []
+        _check_plans(waiting)
         bars = sys.stderr.isatty() if progress is None else progress
         options = {"timeout": timeout, "scheduler": scheduler}
         return _run_all(waiting, out, folder, force=force, bars=bars, echo=echo, **options)
+
+
+def _check_plans(runs: Sequence[Run]) -> None:
+    """Check the frozen claims and the declared specifications if a notebook reads them."""
+    named = {name for run in runs for name in run.notebook.inputs}
+    if "replication/claims.toml" in named:
+        from replication.claims import claims
+
+        claims()
+    if "replication/specifications.toml" in named:
+        from replication.specifications import check_declared
+
+        check_declared()
 
 
 def _run_all(

@@ -7,14 +7,16 @@ trial at the iteration cap counts as that many iterations here, and how many the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from replication.choices import Value
-from replication.claims import Claim
+from replication.claims import Claim, claims, short_label
 from replication.comparisons import Key
+from replication.irl import METHODS
 from replication.measures import measure_trials
 from replication.setting import Setting
 from replication.specifications import Specification, default_of
@@ -36,6 +38,20 @@ UNDEFINED = "undefined"
 MATTERS = 0.05
 """Share of the variance from which on a choice is named in words."""
 
+NAMES = {
+    "MAP": "the map",
+    "DEMO-SHAPE": "the shape of the correct demonstration",
+    "INCORRECT-KINDS": "the kind of the incorrect demonstrations",
+    "F-INDEX": "the reading of Eq. 9",
+    "ALPHA": "α",
+    "F-START": "F₀",
+    "Q-START": "whether Q is kept or reset in each iteration",
+    "TIES": "how ties are broken",
+    "W-START": "the first weights",
+    "ADABOOST-RULE": "the rule of AdaBoost-IRL",
+}
+"""The choices of the factorial, in words."""
+
 Settings = Mapping[Specification, Mapping[Key, Setting]]
 
 
@@ -43,7 +59,8 @@ def effects_table(results: Results, settings: Settings, claims: Sequence[Claim])
     """Return one row for each claim and specification: the effect, its interval, and what it says.
 
     A share (errors that reach zero) holds where it is above the margin itself: so few trials give
-    no interval that could be.
+    no interval that could be. `capped` counts the trials at the iteration cap of all methods of the
+    claim, `capped_x` those of its first.
 
     Parameters
     ----------
@@ -68,10 +85,10 @@ def effects_table(results: Results, settings: Settings, claims: Sequence[Claim])
         y = x
         if claim.y:
             y = np.array([measured[one].get_group(claim.y)[claim.measure] for one in having], float)
-        capped = [
-            sum(int((measured[one].get_group(name)["converged"] == 0).sum()) for name in wanted)
-            for one in having
-        ]
+        capped = {
+            name: [int((measured[one].get_group(name)["converged"] == 0).sum()) for one in having]
+            for name in wanted
+        }
         effect, low, high = _effects(claim, x, y)
         parts.append(
             pd.DataFrame(
@@ -81,7 +98,8 @@ def effects_table(results: Results, settings: Settings, claims: Sequence[Claim])
                     "group": [one.group for one in having],
                     "specification": [one.name for one in having],
                     "n": x.shape[1],
-                    "capped": capped,
+                    "capped": np.sum(list(capped.values()), axis=0),
+                    "capped_x": capped[claim.x],
                     "effect": effect,
                     "low": low,
                     "high": high,
@@ -97,11 +115,15 @@ def effects_table(results: Results, settings: Settings, claims: Sequence[Claim])
 def outcome_shares(effects: pd.DataFrame) -> pd.DataFrame:
     """Return for each claim and group in how many specifications it holds, is open, is reversed.
 
-    `share` is that of the specifications in which it holds, among those with an effect.
+    `share` is that of the specifications in which it holds, among those with an effect. In
+    `with_caps` of them a trial ended at the iteration cap; of the `uncapped` others that have an
+    effect, the claim holds in `holds_uncapped`. `unchanged` counts those with the numbers of the
+    default, whose choice cannot act on the claim or did not.
     """
     rows = []
     for (claim, group), part in effects.groupby(["claim", "group"], sort=False):
         counts = part["outcome"].value_counts()
+        uncapped = part[(part["capped"] == 0) & (part["outcome"] != UNDEFINED)]
         rows.append(
             {
                 "claim": claim,
@@ -110,12 +132,25 @@ def outcome_shares(effects: pd.DataFrame) -> pd.DataFrame:
                 **{name: int(counts.get(name, 0)) for name in (HOLDS, OPEN, REVERSED, UNDEFINED)},
                 "share": _share(part["outcome"], HOLDS),
                 "with_caps": int((part["capped"] > 0).sum()),
+                "uncapped": len(uncapped),
+                "holds_uncapped": int((uncapped["outcome"] == HOLDS).sum()),
+                "unchanged": int(unchanged(part).sum()),
                 "median": float(part["effect"].median()),
                 "lowest": float(part["effect"].min()),
                 "highest": float(part["effect"].max()),
             }
         )
     return pd.DataFrame(rows)
+
+
+def unchanged(effects: pd.DataFrame) -> pd.Series:
+    """Return which rows of one claim have the default's effect and interval, itself left out."""
+    numbers = effects[["effect", "low", "high"]]
+    default = effects["specification"] == "default"
+    same = pd.Series(False, index=effects.index)
+    for _, row in numbers[default].iterrows():
+        same = (numbers == row).all(axis=1) & ~default
+    return same
 
 
 def variance_shares(effects: pd.DataFrame, specifications: Sequence[Specification]) -> pd.DataFrame:
@@ -163,7 +198,7 @@ def variance_shares(effects: pd.DataFrame, specifications: Sequence[Specificatio
             {"claim": claim, "choice": id, "share": share}
             for id, share in {**shares, "noise": noise, "rest": rest}.items()
         ]
-    return pd.DataFrame(rows, columns=["claim", "choice", "share"])
+    return pd.DataFrame(rows, columns=["claim", "choice", "share"]).astype({"share": float})
 
 
 def level_table(effects: pd.DataFrame, specifications: Sequence[Specification]) -> pd.DataFrame:
@@ -191,9 +226,8 @@ def level_table(effects: pd.DataFrame, specifications: Sequence[Specification]) 
 
 
 def findings(
-    outcomes: pd.DataFrame,
-    shares: pd.DataFrame,
-    levels: pd.DataFrame,
+    effects: pd.DataFrame,
+    specifications: Sequence[Specification],
     single: pd.DataFrame,
     soccer: pd.DataFrame,
 ) -> str:
@@ -201,15 +235,15 @@ def findings(
 
     Parameters
     ----------
-    outcomes, shares, levels
-        Of :func:`outcome_shares`, :func:`variance_shares` and :func:`level_table`.
+    effects, specifications
+        Of the factorial.
     single, soccer
         Effects of the specifications that change one choice.
     """
-    lines = ["All choices at once:", "", *findings_at_once(outcomes, shares, levels)]
-    for title, effects in (("mazes", single), ("soccer", soccer)):
+    lines = ["All choices at once:", "", *findings_at_once(effects, specifications)]
+    for title, own in (("mazes", single), ("soccer", soccer)):
         lines += ["", f"One choice at a time, {title}:", ""]
-        for claim, part in effects.groupby("claim", sort=False):
+        for claim, part in own.groupby("claim", sort=False):
             outcome = part.set_index("specification")["outcome"]
             start = outcome["default"]
             others = [name for name in (HOLDS, REVERSED, OPEN, UNDEFINED) if name != start]
@@ -219,59 +253,127 @@ def findings(
                 if (outcome == other).any()
             ]
             said = "; ".join(moved) or "the same under every other value"
-            lines.append(f"- {claim}: {start} with the defaults; {said}.")
+            lines.append(
+                f"- {_title(claim)}: {start} with the defaults; {said}. "
+                f"{int(unchanged(part).sum())} of the {len(part) - 1} changes leave its numbers as "
+                "they are."
+            )
     return "\n".join(lines)
 
 
-def findings_at_once(
-    outcomes: pd.DataFrame, shares: pd.DataFrame, levels: pd.DataFrame
-) -> list[str]:
+def findings_at_once(effects: pd.DataFrame, specifications: Sequence[Specification]) -> list[str]:
     """Return in words what each claim depends on when all choices vary, a line of a list each.
 
     Parameters
     ----------
-    outcomes, shares, levels
-        Of :func:`outcome_shares`, :func:`variance_shares` and :func:`level_table`.
+    effects, specifications
+        Of the factorial.
     """
+    shares = variance_shares(effects, specifications)
+    without = variance_shares(effects[effects["capped"] == 0], specifications)
+    levels = level_table(effects, specifications)
     lines = []
-    for row in outcomes[outcomes["group"] == "factorial"].itertuples():
-        n = row.specifications - row.undefined
-        line = (
-            f"- {row.claim} holds in {row.holds} of {n} specifications ({row.share:.0%}), is open "
-            f"in {row.open} and reversed in {row.reversed}"
-        )
-        own = shares[(shares["claim"] == row.claim) & ~shares["choice"].isin(["noise", "rest"])]
-        largest = own.sort_values("share", ascending=False).head(1)
+    for row in outcome_shares(effects).itertuples():
+        part = effects[effects["claim"] == row.claim]
+        line = f"- {_title(row.claim)}: {_counts(row)}{_caps(row, part)}"
+        largest = _choices_of(shares, row.claim).nlargest(1, "share")
         for one in largest[largest["share"] > MATTERS].itertuples():
-            part = levels[(levels["claim"] == row.claim) & (levels["choice"] == one.choice)]
-            by_value = ", ".join(
-                f"{value.value} {value.holds:.0%}"
-                for value in part.sort_values("holds", ascending=False, kind="stable").itertuples()
-                if not np.isnan(value.holds)
-            )
-            line += f". {one.choice} accounts for {one.share:.0%} of the variance of its effect"
+            name = NAMES.get(one.choice, one.choice)
+            line += f" It depends most on {name}: {one.share:.0%} of the variance of the effect"
+            left = _choices_of(without, row.claim).set_index("choice")["share"]
+            if row.with_caps and one.choice in left.index:
+                line += f", {left[one.choice]:.0%} without trials at the cap"
             if row.holds:
-                line += f"; the claim holds with {by_value}"
-        lines.append(f"{line}.")
+                line += f". It holds with {_by_value(levels, part, row.claim, one.choice)}"
+            line += "."
+        lines.append(line)
     return lines
 
 
+def chance(effects: pd.DataFrame, specifications: Sequence[Specification]) -> str:
+    """Return in words how far the shares of a choice that cannot act differ by chance."""
+    levels = level_table(effects, specifications)
+    own = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "ADABOOST-RULE")]
+    return (
+        f"{NAMES['ADABOOST-RULE']} cannot act on *{short_label('SAVES-OPEN')}*, and yet this holds "
+        f"with its {len(own)} values in {own['holds'].min():.0%} to {own['holds'].max():.0%} of "
+        f"the specifications"
+    )
+
+
+def _title(claim: str) -> str:
+    label = short_label(claim)
+    return f"**{label[0].upper()}{label[1:]}**"
+
+
+def _counts(row: Any) -> str:
+    """Say how many specifications have which outcome."""
+    n = row.specifications - row.undefined
+    said = f"holds in {row.holds} of {n} specifications ({row.share:.0%})"
+    if row.undefined:
+        said += f" that have an effect ({row.undefined} do not)"
+    return f"{said}, is open in {row.open} and reversed in {row.reversed}."
+
+
+def _caps(row: Any, part: pd.DataFrame) -> str:
+    """Say in how many specifications trials end at the cap, whose they are, and what is left."""
+    if not row.with_caps:
+        return ""
+    claim = claims().by_id(row.claim)
+    said = f" In {row.with_caps} of them trials end at the iteration cap"
+    whose = (
+        ""
+        if part["capped_x"].any()
+        else f", all of them of {METHODS[claim.y].label.partition(' (')[0]}"
+    )
+    if claim.statistic == "share":
+        other = "; every trial of the other method reaches zero, in every specification"
+        return f"{said}{whose}{other if whose else ''}."
+    others = f"{row.uncapped} others{' that have an effect' if row.undefined else ''}"
+    return f"{said}{whose}; it holds in {row.holds_uncapped} of the {others}."
+
+
+def _choices_of(shares: pd.DataFrame, claim: str) -> pd.DataFrame:
+    own = shares[(shares["claim"] == claim) & ~shares["choice"].isin(["noise", "rest"])]
+    return own.dropna(subset="share")
+
+
+def _by_value(levels: pd.DataFrame, part: pd.DataFrame, claim: str, choice: str) -> str:
+    """Say in which share of the specifications a claim holds with each value of a choice."""
+    own = levels[(levels["claim"] == claim) & (levels["choice"] == choice)].dropna(subset="holds")
+    words = part["specification"].str.split()
+    said = []
+    for value in own.sort_values("holds", ascending=False, kind="stable").itertuples():
+        having = [f"{choice}={value.value}" in some for some in words]
+        always = (part["capped"][having] >= part["n"][having]).all()
+        said.append(f"{value.value} {value.holds:.0%}{' (always at the cap)' if always else ''}")
+    return ", ".join(said)
+
+
 def ablations_table(results: Results, settings: Mapping[str, Setting]) -> pd.DataFrame:
-    """Return one row a setting: a summary of its iterations, capped trials counting as the cap."""
+    """Return one row a setting: a summary of its iterations, capped trials counting as the cap.
+
+    `more` is the mean number of iterations more than in the first setting, over the same seeds,
+    with its interval.
+    """
     rows = []
+    first = results.iterations(next(iter(settings.values())))
     for name, setting in settings.items():
         counts = results.iterations(setting).astype(float)
-        low, high = mean_intervals(counts[None])
+        low, high = mean_intervals(np.stack([counts, counts - first]))
         rows.append(
             {
                 "setting": name,
                 "n": len(counts),
                 "capped": int((~results.converged(setting)).sum()),
                 "mean": counts.mean(),
-                "low": float(low[0]),
-                "high": float(high[0]),
+                "low": low[0],
+                "high": high[0],
                 "sd": counts.std(ddof=1),
                 "median": float(np.median(counts)),
+                "more": (counts - first).mean(),
+                "more_low": low[1],
+                "more_high": high[1],
             }
         )
     return pd.DataFrame(rows)

@@ -10,14 +10,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from replication.choices import ChoiceError, Value, register
 from replication.claims import ClaimError, claims
 from replication.comparisons import EXPERIMENTS, F_INDICES, F_LABELS, Key, method_settings
+from replication.demochecks import DemoError
 from replication.demos import Demo, Demos, load_demos
 from replication.envs.field import SoccerField
 from replication.envs.maze import Maze
@@ -38,6 +39,12 @@ MOVES = 33
 """Obstacle cells of a random maze, and the length of its shortest path."""
 
 
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0)]
+Trials = Annotated[int, Field(ge=2)]
+"""Intervals need two trials at least."""
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -45,15 +52,15 @@ class _Strict(BaseModel):
 class Single(_Strict):
     """Specifications that change one choice each."""
 
-    trials: int
+    trials: Trials
     choices: Mapping[str, tuple[Value, ...]]
 
 
 class Factorial(Single):
     """Specifications that set all choices at once: a balanced fraction of the full factorial."""
 
-    size: int
-    seed: int
+    size: Count
+    seed: Seed
 
 
 class Mazes(_Strict):
@@ -74,17 +81,17 @@ class Soccer(_Strict):
 class Ablations(_Strict):
     """The method with parts of it switched off, and the number of incorrect demonstrations."""
 
-    trials: int
+    trials: Trials
     traces: tuple[Mapping[str, float], ...]
-    seed: int
-    numbers: tuple[int | Literal["all"], ...]
+    seed: Seed
+    numbers: tuple[Annotated[int, Field(ge=0)] | Literal["all"], ...]
 
 
 class Declared(_Strict):
     """The whole file."""
 
-    root_seed: int
-    iteration_cap: int
+    root_seed: Seed
+    iteration_cap: Count
     mazes: Mazes
     soccer: Soccer
     ablations: Ablations
@@ -109,8 +116,32 @@ class Specification:
 @cache
 def declared() -> Declared:
     """Return the specifications of the package."""
-    text = resources.files("replication").joinpath("specifications.toml").read_text("utf-8")
-    return parse_specifications(text)
+    return parse_specifications(_text())
+
+
+def check_declared() -> None:
+    """Check the package's specifications as far as half a second goes, before anything runs.
+
+    Beside the file, these are the kinds of incorrect demonstrations, which the stored ones have to
+    have. To make all settings takes twenty seconds: random mazes and soccer worlds are made anew.
+
+    Raises
+    ------
+    ChoiceError, ClaimError
+        As :func:`parse_specifications`, and for a kind that a task does not have.
+    """
+    plan = declared()
+    for place, table, task in (
+        ("mazes.single", plan.mazes.single.choices, "open-maze"),
+        ("mazes.factorial", plan.mazes.factorial.choices, "open-maze"),
+        ("soccer.single", plan.soccer.single.choices, "soccer"),
+    ):
+        demos = load_demos(resolve(EXPERIMENTS[task].demos))
+        for kinds in table.get("INCORRECT-KINDS", ()):
+            try:
+                demos.select(str(kinds))
+            except DemoError as error:
+                raise ChoiceError(f"specifications.toml, {place}: {error}") from None
 
 
 def parse_specifications(text: str) -> Declared:
@@ -129,11 +160,15 @@ def parse_specifications(text: str) -> Declared:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
         raise ChoiceError(f"specifications.toml, {place}: {first['msg']}") from None
-    for id in (*found.mazes.claims, *found.soccer.claims):
-        try:
-            claims().by_id(id)
-        except ClaimError as error:
-            raise ClaimError(f"specifications.toml: {error}") from None
+    for place, ids, task in (
+        ("mazes", found.mazes.claims, "open-maze"),
+        ("soccer", found.soccer.claims, "soccer"),
+    ):
+        for id in ids:
+            try:
+                _check_claim(id, task)
+            except ClaimError as error:
+                raise ClaimError(f"specifications.toml, {place}.claims: {error}") from None
     tables = {
         "mazes.single": found.mazes.single.choices,
         "mazes.factorial": found.mazes.factorial.choices,
@@ -148,8 +183,11 @@ def parse_specifications(text: str) -> Declared:
             for value in values:
                 try:
                     _check(id, value)
+                    _check_task(id, soccer=place == "soccer.single")
                 except ChoiceError as error:
                     raise ChoiceError(f"specifications.toml, {place}: {error}") from None
+    if 0 not in found.ablations.numbers:
+        raise ChoiceError("specifications.toml, ablations.numbers: add 0, which saving is against")
     for id, values in found.mazes.factorial.choices.items():
         if found.mazes.factorial.size % len(values):
             raise ChoiceError(
@@ -157,6 +195,28 @@ def parse_specifications(text: str) -> Declared:
                 f"balanced over {found.mazes.factorial.size} specifications"
             )
     return found
+
+
+def _text() -> str:
+    return resources.files("replication").joinpath("specifications.toml").read_text("utf-8")
+
+
+def _check_claim(id: str, task: str) -> None:
+    """Refuse a claim of another task, or one that has no effect under a specification."""
+    claim = claims().by_id(id)
+    if claim.direction == "inside":
+        raise ClaimError(f"{id} is about a published number; name claims that compare")
+    if claim.task != task:
+        raise ClaimError(f"{id} is about the task {claim.task!r}; name claims about {task!r}")
+
+
+def _check_task(id: str, *, soccer: bool) -> None:
+    """Refuse a choice that nothing in the task depends on."""
+    of_mazes = id == "MAP" or id.startswith("ADABOOST")
+    of_mazes = of_mazes or (id in register() and register()[id].field.startswith("Expert."))
+    if of_mazes if soccer else id.startswith("SOCCER"):
+        here, there = ("soccer", "the mazes") if soccer else ("the mazes", "soccer")
+        raise ChoiceError(f"{id} changes nothing in {here}; it belongs to {there}")
 
 
 def _check(id: str, value: Value) -> None:

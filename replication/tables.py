@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from replication.claims import LABELS
 from replication.comparisons import F_INDICES, F_LABELS, Key
 from replication.demos import Demos
 from replication.envs.maze import Maze
@@ -240,23 +241,30 @@ def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def verdict_lines(table: pd.DataFrame) -> list[str]:
-    """Return judged claims for a terminal: a line each, the verdict first."""
-    lines = []
-    for _, part in table.groupby("id", sort=False):
+    """Return judged claims for a terminal, below a head: a line each, the verdict first."""
+    head = {"Verdict": "verdict", "Paper": "paper"} | {F_LABELS[f]: F_LABELS[f] for f in F_INDICES}
+    rows = [head | {"Claim": "claim"}]
+    for (id, part), row in zip(
+        table.groupby("id", sort=False), readable_verdicts(table).to_dict("records"), strict=True
+    ):
         verdict = overall(part["verdict"].tolist())
-        first = part.iloc[0]
-        lines.append(f"{verdict:<15}{first['claim']} ({first['place']})")
-    return lines
+        rows.append(row | {"Verdict": verdict, "Claim": LABELS.get(str(id), str(id))})
+    return [
+        f"{row['Verdict']:<16}{row['Paper']:<8}"
+        + "".join(f"{row[F_LABELS[f]]:<23}" for f in F_INDICES)
+        + row["Claim"]
+        for row in rows
+    ]
 
 
 def _verdict(part: pd.DataFrame) -> str:
-    """Return the verdict on a claim, and where its readings differ or give none, why."""
+    """Return the verdict on a claim; why there is none, or what each reading gives."""
     verdict = overall(part["verdict"].tolist())
-    if part["verdict"].nunique() > 1:
+    if verdict == NOT_TESTABLE:
+        verdict = f"{verdict}: {part['why'][part['verdict'] == NOT_TESTABLE].iloc[0]}"
+    elif part["verdict"].nunique() > 1:
         each = (f"{F_LABELS[row.F].split()[0]} {row.verdict}" for row in part.itertuples())
         verdict = f"{verdict} ({', '.join(each)})"
-    elif verdict == NOT_TESTABLE:
-        verdict = f"{verdict}: {part['why'].iloc[0]}"
     return f"**{verdict}**" if verdict == REPRODUCED else verdict
 
 
@@ -283,6 +291,10 @@ def readable_outcomes(table: pd.DataFrame) -> pd.DataFrame:
     for name in ("specifications", "holds", "open", "reversed", "undefined"):
         readable[name.capitalize()] = table[name]
     readable["With capped trials"] = table["with_caps"]
+    readable["Holds in the others"] = [
+        f"{row.holds_uncapped} of {row.uncapped}" for row in table.itertuples()
+    ]
+    readable["As the default"] = table["unchanged"]
     readable["Effect: median (least, largest)"] = [
         f"{row.median:.2f} ({row.lowest:.2f}, {row.highest:.2f})" for row in table.itertuples()
     ]
@@ -316,6 +328,10 @@ def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
     readable["Median"] = table["median"].map("{:g}".format)
     readable["At the cap"] = [
         f"{c} of {n}" for c, n in zip(table["capped"], table["n"], strict=True)
+    ]
+    readable["More than the first [95 %]"] = [
+        _interval(*row)
+        for row in zip(table["more"], table["more_low"], table["more_high"], strict=True)
     ]
     return readable
 

@@ -44,7 +44,8 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
         published value of it. For published means and SDs, `predicted_low` to `predicted_high` is
         where ours should lie. `fewer` is the probability that x is below y in one trial each, ties
         counting half; `power` that of finding an effect as large as the published one. `p_holm` is
-        adjusted over all tests of the table. `criteria` is the hash of the frozen file.
+        adjusted over all tests of the table. `why` is empty for what is reproduced or reversed.
+        `criteria` is the hash of the frozen file.
     """
     rows = []
     for claim in claims.claim:
@@ -67,21 +68,23 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
 def overall(verdicts: Sequence[str]) -> str:
     """Return the verdict on a claim from those under each reading of Eq. 9.
 
+    A claim of which one reading cannot be tested gets no verdict: what the other reading gives
+    still stands in its row. So a number that made a choice under one reading is never judged.
+
     Examples
     --------
     >>> overall(["reproduced", "undecided"]), overall(["not testable", "reproduced"])
-    ('partly', 'reproduced')
+    ('partly', 'not testable')
     >>> overall(["undecided", "not reproduced"]), overall(["reversed", "not reproduced"])
     ('undecided', 'not reproduced')
     """
-    judged = [verdict for verdict in verdicts if verdict != NOT_TESTABLE]
-    if not judged:
+    if NOT_TESTABLE in verdicts:
         return NOT_TESTABLE
-    if len(set(judged)) == 1:
-        return judged[0]
-    if REPRODUCED in judged:
+    if len(set(verdicts)) == 1:
+        return verdicts[0]
+    if REPRODUCED in verdicts:
         return PARTLY
-    return UNDECIDED if UNDECIDED in judged else NOT_REPRODUCED
+    return UNDECIDED if UNDECIDED in verdicts else NOT_REPRODUCED
 
 
 def decide(low: float, high: float, margin: float, direction: str, p: float, level: float) -> str:
@@ -184,16 +187,25 @@ def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
     if np.isnan([row.effect, row.low, row.high]).any():
         return NOT_TESTABLE, "the trials do not vary"
     if claim.statistic == "published-run":
-        return (REPRODUCED if row.low <= row.paper <= row.high else NOT_REPRODUCED), ""
+        if row.low <= row.paper <= row.high:
+            return REPRODUCED, ""
+        return NOT_REPRODUCED, "the paper's run lies outside the central 95 % of ours"
     if claim.direction == "inside":
-        inside = row.predicted_low <= row.effect <= row.predicted_high
-        return (REPRODUCED if inside else NOT_REPRODUCED), ""
+        if row.predicted_low <= row.effect <= row.predicted_high:
+            return REPRODUCED, ""
+        return NOT_REPRODUCED, "ours lies outside the range that the paper's predicts"
     found = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
-    if found != UNDECIDED:
-        return found, ""
     excluded = not row.low <= claim.margin <= row.high
-    said = "the interval excludes the margin, but the test does not reject"
-    return found, said if excluded else "the test rejects, but the interval includes the margin"
+    if found == UNDECIDED and excluded:
+        return found, "the interval excludes the margin, but the test does not reject"
+    if found == UNDECIDED:
+        return found, "the test rejects, but the interval includes the margin"
+    if found != NOT_REPRODUCED:
+        return found, ""
+    if np.isnan(row.paper):
+        return found, "the interval includes the margin"
+    included = "and" if row.low <= row.paper <= row.high else "but not"
+    return found, f"the interval includes the margin, {included} the published effect"
 
 
 def _trials(measures: pd.DataFrame, task: str, method: str, f: str) -> pd.DataFrame:

@@ -16,11 +16,14 @@ from replication.calibration import (
     ROOT,
     TRIALS,
     calibration_table,
+    check_findings,
+    check_table,
     chosen,
     divergence,
     findings,
     grid,
     grid_settings,
+    readable_check,
 )
 from replication.choices import register
 from replication.claims import claims
@@ -202,6 +205,32 @@ def test_findings_say_whether_the_nearest_is_the_default() -> None:
     assert findings(table).startswith("The nearest point is our default: ")
 
 
+@pytest.mark.parametrize(
+    ("shift", "scale", "said"),
+    [
+        (0.0, 1.0, "both lie where"),
+        (0.0, 2.0, "the mean lies where"),
+        (3.0, 1.0, "the SD lies where"),
+        (-3.0, 2.0, "neither lies where"),
+    ],
+)
+def test_check_says_what_is_left_of_the_nearness(shift: float, scale: float, said: str) -> None:
+    """Mean and SD of new trials are each held against where they would lie."""
+    draw = np.random.default_rng(1).normal(size=100)
+    draw = (draw - draw.mean()) / draw.std(ddof=1)
+    new = PAIR.mean + shift + scale * PAIR.sd * draw
+    runs = [("of the grid", "printed", new[:30]), ("new", "printed", new), ("new", "updated", draw)]
+    check = check_table(runs)
+    assert said in check_findings(check)
+    assert "best of 120 points, each known from 30 trials" in check_findings(check)
+    assert check["n"].tolist() == [30, 100, 100]
+    row = check.iloc[1]
+    assert (row["mean"], row["sd"]) == pytest.approx((PAIR.mean + shift, scale * PAIR.sd))
+    assert row["low"] < row["mean"] < row["high"]
+    assert row["sd_low"] < row["sd"] < row["sd_high"]
+    assert readable_check(check)["Trials"].tolist() == ["30, of the grid", "100, new", "100, new"]
+
+
 # --- the published grid ----------------------------------------------------------------------
 
 
@@ -224,3 +253,18 @@ def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
 def test_published_findings_are_recounted(stored: pd.DataFrame) -> None:
     """What the notebook says of the grid counts the points of the published table."""
     assert f"But {near(stored).sum()} of the 120 points" in findings(stored)
+
+
+def test_published_check_is_that_of_the_judging_run(stored: pd.DataFrame) -> None:
+    """The new trials are those that the claims are judged by, the others those of the grid."""
+    check = read_table(PROJECT / "figures" / "calibration_check.csv")
+    judged = read_table(PROJECT / "figures" / "claims.csv")
+    assert check["n"].tolist() == [TRIALS, *[claims().judging.trials["open-maze"]] * 2]
+    assert check.loc[0, ["mean", "sd"]].tolist() == stored.loc[0, ["mean", "sd"]].tolist()
+    names = ["effect", "low", "high", "predicted_low", "predicted_high"]
+    for id, own in (
+        ("MEAN-UNIFIED-OPEN", ["mean", "low", "high", "predicted_low", "predicted_high"]),
+        ("SD-UNIFIED-OPEN", ["sd", "sd_low", "sd_high", "sd_predicted_low", "sd_predicted_high"]),
+    ):
+        due = judged[judged["id"] == id][names].to_numpy(float)
+        np.testing.assert_allclose(check.loc[1:, own].to_numpy(float), due, rtol=1e-8)

@@ -11,7 +11,6 @@ from matplotlib.text import Text
 
 from replication.calibration import CALIBRATED, PAIR, grid
 from replication.claim_figures import (
-    LABELS,
     OUTCOMES,
     UNITS,
     calibration_figure,
@@ -27,7 +26,7 @@ from replication.claim_figures import (
     shares_figure,
     single_figure,
 )
-from replication.claims import claims
+from replication.claims import LABELS, claims
 from replication.figures import save_figure
 from replication.sensitivity import outcome_shares
 from replication.specifications import declared, factorial_specifications, single_specifications
@@ -58,6 +57,7 @@ def some_effects() -> pd.DataFrame:
                     "specification": [one.name for one in specifications],
                     "n": 10,
                     "capped": rng.integers(0, 2, n),
+                    "capped_x": 0,
                     "effect": effect,
                     "low": effect * 0.7 if ratio else effect - 8,
                     "high": effect * 1.4 if ratio else effect + 8,
@@ -104,10 +104,11 @@ SHARES = pd.DataFrame(
 PAIRS = [(0, 0), (10, 75), (30, 185), (100, 365), (300, 581), (1000, 1128), (1565, 1565)]
 NUMBERS = pd.DataFrame(
     [
-        {"F": f, "number": number, "pairs": pairs, "mean": mean, "low": mean - 1, "high": mean + 1}
+        {"F": f, "number": number, "pairs": pairs, "saved": saved}
+        | {"saved_low": saved - 1, "saved_high": saved + 1}
         for slope, f in enumerate(("printed", "updated"))
         for number, pairs in PAIRS
-        for mean in [41 - slope * np.log1p(pairs)]
+        for saved in [slope * np.log1p(pairs)]
     ]
 )
 
@@ -123,7 +124,7 @@ def drawings() -> dict[str, Figure]:
         "soccer": single_figure(EFFECTS, KICKED),
         "shares": shares_figure(SHARES, outcome_shares(EFFECTS)),
         "calibration": calibration_figure(POINTS, PAIR),
-        "numbers": numbers_figure(NUMBERS),
+        "numbers": numbers_figure(NUMBERS, 3.62),
     }
 
 
@@ -231,6 +232,25 @@ def test_cells_are_per_cents(drawings: dict[str, Figure]) -> None:
     assert sorted(shown) == sorted(f"{100 * share:.0f}" for share in SHARES["share"])
 
 
+def test_noise_of_all_the_variance_is_at_least_that() -> None:
+    """Noise is cut off at the whole variance, and the cell says so."""
+    noisy = SHARES.copy()
+    noisy.loc[noisy["choice"] == "noise", "share"] = 1.0
+    figure = shares_figure(noisy, outcome_shares(EFFECTS))
+    shown = [text.get_text() for panel in figure.axes[:2] for text in panel.texts]
+    assert shown.count("≥100") == len(DRAWN)
+
+
+def test_missing_effects_are_told() -> None:
+    """A row without an effect says that it has none."""
+    broken = EFFECTS.copy()
+    row = (broken["claim"] == "STEADIER") & (broken["specification"] == "TIES=first")
+    broken.loc[row, ["effect", "low", "high", "outcome"]] = [np.nan, np.nan, np.nan, "undefined"]
+    panels = single_figure(broken, DRAWN).axes
+    shown = [[text.get_text() for text in panel.texts].count("undefined") for panel in panels]
+    assert shown == [0, 1, 0, 0]
+
+
 def test_words_name_the_counts() -> None:
     """Each description has the numbers of its frame."""
     own = EFFECTS[(EFFECTS["claim"] == "FASTER")]
@@ -240,12 +260,20 @@ def test_words_name_the_counts() -> None:
     assert f"open in {factorial['open']}, reversed in {factorial['reversed']}" in said
     changed = own[(own["group"] == "single") & (own["specification"] != "default")]
     holds = (changed["outcome"] == "holds").sum()
-    assert f"holds in {holds} of 43 specifications" in describe_single(EFFECTS, DRAWN)
+    said = describe_single(EFFECTS, DRAWN)
+    assert f"holds in {holds} of 43 specifications" in said
+    assert "0 of them have the numbers of the default" in said
+    uncapped = own[(own["group"] == "factorial") & (own["capped"] == 0)]
+    held = (uncapped["outcome"] == "holds").sum()
+    said = describe_curve(EFFECTS, FACTORIAL, DRAWN[0])
+    assert f"without trials at the cap: holds in {held} of {len(uncapped)}" in said
     assert "MAP for FASTER (70%), DEMO-SHAPE for STEADIER (70%)" in describe_shares(
         SHARES, outcome_shares(EFFECTS)
     )
     assert "3 of the points are nearer" in describe_calibration(POINTS, PAIR)
-    assert "from 41.0 with 0 marked pairs to 33.6 with 1565" in describe_numbers(NUMBERS)
+    said = describe_numbers(NUMBERS)
+    assert "With the most marked pairs, 1565, incorrect demonstrations save 0.0 [-1.0, 1.0]" in said
+    assert "7.4 [6.4, 8.4] iterations under Fᵢ₊₁ (updated)" in said
 
 
 def test_words_count_every_comparative_claim() -> None:

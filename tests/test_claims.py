@@ -150,6 +150,12 @@ def test_hash_knows_the_order_of_lists() -> None:
         ("[judging]", "more = 1\n[judging]", ["more", "not permitted"]),
         ("used = {printed", "used = {print", ["claim MEAN-UNIFIED-OPEN.used.print"]),
         ("[judging]", "[judging", ["not TOML", "line"]),
+        ("confidence = 0.95", "confidence = 0.9", ["judging: all intervals", "0.95, not 0.9"]),
+        ("soccer = 60", "soccer = 0", ["judging.trials.soccer", "greater", "not 0"]),
+        ("fewest = 30", "fewest = 0", ["judging.fewest", "greater", "not 0"]),
+        ("level = 0.05", "level = 5", ["judging.level", "less than 1, not 5"]),
+        ("root_seed = 2026", "root_seed = -1", ["judging.root_seed", "greater", "not -1"]),
+        ('y = "adaboost"', 'y = "unified"', ["claim FASTER: x and y are both 'unified'"]),
     ],
 )
 def test_bad_entry_is_one_line(old: str, new: str, named: list[str]) -> None:
@@ -250,6 +256,11 @@ def test_comments_explain_every_measure_statistic_and_verdict() -> None:
     for one in CLAIMS:
         for word in (one.measure, one.statistic):
             assert re.search(rf"^#   {word} ", head, flags=re.MULTILINE), word
+
+
+def test_criteria_are_those_of_the_judging_run() -> None:
+    """The hash is that of the file by which the trials of the judging run were first judged."""
+    assert criteria_hash() == "5fa3c1710dbc4e60dede829acda1c909ef734aeaf6a4c089c739c23e02327345"
 
 
 def test_published_verdicts_are_by_this_file() -> None:

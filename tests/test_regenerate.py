@@ -19,7 +19,7 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import Demos, execution, paths
+from replication import Demos, claims, execution, paths, specifications
 from replication.files import write_file
 from replication.notebooks import Notebook, NotebookError, RunError
 from replication.regenerate import read_runs, run_notebooks
@@ -106,6 +106,42 @@ def test_bad_parameter_is_refused_before_any_notebook_runs(
     first = write(name="first", parameters=PARAMETERS + "\ntrails = 1" * ("trails" in given))
     with pytest.raises(NotebookError, match=re.escape(message)):
         run(first, write(name="second"), parameters=given)
+
+
+@pytest.mark.parametrize(
+    ("module", "old", "new", "said"),
+    [
+        (claims, 'statistic = "sd-ratio"', 'statistic = "sd-rato"', "claim STEADIER.statistic"),
+        (claims, "soccer = 60", "soccer = 0", "judging.trials.soccer: Input should be greater"),
+        (specifications, "trials = 10", "trials = 0", "mazes.factorial.trials: Input should be"),
+        (specifications, '["hit", "detour", "op', '["lob", "detour", "op', "soccer.single: "),
+        (specifications, '"far-detour", "opposite"', '"overspeed"', "mazes.single: task open-maze"),
+    ],
+)
+def test_bad_plans_are_refused_before_any_notebook_runs(
+    write: Write,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+    module: Any,
+    old: str,
+    new: str,
+    said: str,
+) -> None:
+    """A mistake in claims or specifications that only the second notebook reads stops the first."""
+    name = module.__name__.rpartition(".")[2]
+    text = module._text()
+    assert old in text
+    monkeypatch.setattr(module, "_text", lambda: text.replace(old, new, 1))
+    cached = claims.claims if module is claims else specifications.declared
+    cached.cache_clear()
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(papermill, "execute_notebook", lambda *_, **__: pytest.fail("executed"))
+            with pytest.raises(ValueError, match=f"^{name}.toml, {said}"):
+                run(write(name="first"), write(name="last", inputs=[f"replication/{name}.toml"]))
+        run(write(name="first"))
+    finally:
+        cached.cache_clear()
 
 
 @pytest.mark.usefixtures("no_kernel")

@@ -13,27 +13,31 @@ from replication import Demos
 from replication.claims import Claim, claims
 from replication.comparisons import method_settings
 from replication.measures import measure_trials
+from replication.paths import PROJECT
 from replication.sensitivity import (
     HOLDS,
+    NAMES,
     OPEN,
     REVERSED,
     UNDEFINED,
     _effects,
     _outcome,
     ablations_table,
+    chance,
     effects_table,
     findings,
     findings_at_once,
     level_table,
     numbers_table,
     outcome_shares,
+    unchanged,
     variance_shares,
 )
 from replication.setting import Setting
-from replication.specifications import Specification
+from replication.specifications import Specification, declared, factorial_specifications
 from replication.statistics import mean_intervals, sd_ratio_intervals, share_interval
 from replication.store import Store
-from replication.tables import pairs_near
+from replication.tables import pairs_near, read_table
 from replication.trials import Results, run_trials
 
 FEW = {"episodes": 100, "horizon": 40}
@@ -134,8 +138,11 @@ def test_shares_of_outcomes_by_hand() -> None:
         {
             "claim": "FASTER",
             "group": ["single"] * 2 + ["factorial"] * 5,
+            "specification": ["default", "b", "c", "d", "e", "f", "g"],
             "capped": [0, 0, 3, 0, 1, 0, 0],
-            "effect": [-1.0, 0.0, -4.0, -2.0, 1.0, 3.0, np.nan],
+            "effect": [-1.0, -1.0, -4.0, -2.0, 1.0, 3.0, np.nan],
+            "low": [-2.0, -2.0, -5.0, -3.0, -1.0, 2.0, np.nan],
+            "high": [-0.5, -0.5, -3.0, -1.0, 2.0, 4.0, np.nan],
             "outcome": [HOLDS, OPEN, HOLDS, HOLDS, OPEN, REVERSED, UNDEFINED],
         }
     )
@@ -145,6 +152,8 @@ def test_shares_of_outcomes_by_hand() -> None:
     assert [factorial[name] for name in (HOLDS, OPEN, REVERSED, UNDEFINED)] == [2, 1, 1, 1]
     assert factorial["specifications"] == 5
     assert (factorial["share"], factorial["with_caps"]) == (0.5, 2)
+    assert (factorial["uncapped"], factorial["holds_uncapped"]) == (2, 1)
+    assert (single["unchanged"], factorial["unchanged"]) == (1, 0)
     assert (factorial["median"], factorial["lowest"], factorial["highest"]) == (-0.5, -4.0, 3.0)
 
 
@@ -296,62 +305,149 @@ def test_levels_add_up() -> None:
 
 # --- what is said ----------------------------------------------------------------------------
 
+RULES: dict[str, tuple[Any, ...]] = {
+    "ADABOOST-RULE": ("mismatch", "graded"),
+    "TIES": ("random", "first"),
+}
 
-def test_findings_have_the_counts_of_the_frame() -> None:
-    """Each claim is named with its counts, the choice that matters most and what moves it."""
-    outcomes = pd.DataFrame(
-        {
-            "claim": ["FASTER", "FASTER", "STEADIER"],
-            "group": ["single", "factorial", "factorial"],
-            "specifications": [4, 240, 240],
-            "holds": [1, 180, 12],
-            "open": [2, 50, 100],
-            "reversed": [1, 10, 108],
-            "undefined": [0, 0, 20],
-            "share": [0.25, 0.75, 12 / 220],
-        }
+
+def ruled(claim: str, statistic: str, by_rule: dict[str, float]) -> pd.DataFrame:
+    """Make effects up that the rule of AdaBoost-IRL decides, all trials of "graded" at the cap."""
+    made = without_twin(crossed(RULES, times=20))
+    values = [by_rule[str(dict(one.choices)["ADABOOST-RULE"])] for one in made]
+    table = effects(made, np.array(values), half=0.5, statistic=statistic, claim=claim)
+    graded = [dict(one.choices)["ADABOOST-RULE"] == "graded" for one in made]
+    return table.assign(capped=np.where(graded, 10, 0), capped_x=0)
+
+
+def test_findings_count_with_and_without_caps() -> None:
+    """Each claim has its counts, whose trials are at the cap, and what is left without them."""
+    made = without_twin(crossed(RULES, times=20))
+    table = ruled("FASTER", "mean-difference", {"mismatch": 0.0, "graded": -150.0})
+    table.loc[0, ["effect", "low", "high", "outcome"]] = [-4.0, -5.0, -3.0, HOLDS]
+    zero = ruled("ZERO-OPEN", "share", {"mismatch": 1.0, "graded": 0.0})
+    zero["outcome"] = np.where(zero["effect"] > 0.9, HOLDS, REVERSED)
+    faster, reaches = findings_at_once(pd.concat([table, zero]), made)
+    assert faster.startswith(
+        "- **Faster than AdaBoost-IRL**: holds in 41 of 80 specifications (51%), is open in 39 and "
+        "reversed in 0. In 40 of them trials end at the iteration cap, all of them of "
+        "AdaBoost-IRL; it holds in 1 of the 40 others. It depends most on the rule of "
+        "AdaBoost-IRL: 100% of the variance of the effect, "
     )
-    shares = pd.DataFrame(
-        {
-            "claim": ["FASTER"] * 4 + ["STEADIER"] * 2,
-            "choice": ["TIES", "ALPHA", "noise", "rest", "ALPHA", "TIES"],
-            "share": [0.2, 0.3, 0.9, 0.9, 0.04, 0.01],
-        }
-    )
-    levels = pd.DataFrame(
-        {
-            "claim": "FASTER",
-            "choice": ["ALPHA", "ALPHA", "ALPHA", "TIES"],
-            "value": [0.1, 0.5, 0.9, "first"],
-            "holds": [0.5, 1.0, np.nan, 0.75],
-        }
-    )
-    assert findings_at_once(outcomes, shares, levels) == [
-        "- FASTER holds in 180 of 240 specifications (75%), is open in 50 and reversed in 10. "
-        "ALPHA accounts for 30% of the variance of its effect; the claim holds with 0.5 100%, "
-        "0.1 50%.",
-        "- STEADIER holds in 12 of 220 specifications (5%), is open in 100 and reversed in 108.",
+    assert faster.endswith("It holds with graded 100% (always at the cap), mismatch 2%.")
+    assert "; every trial of the other method reaches zero, in every specification." in reaches
+
+
+def test_caps_of_the_first_method_are_not_put_on_the_other() -> None:
+    """If the claim's own method has trials at the cap nothing is said of whose they are."""
+    made = without_twin(crossed(RULES, times=20))
+    table = ruled("FASTER", "mean-difference", {"mismatch": 0.0, "graded": -150.0})
+    table.loc[table["capped"] > 0, "capped_x"] = 1
+    (said,) = findings_at_once(table, made)
+    assert "end at the iteration cap; it holds in 0 of the 40 others." in said
+    assert "AdaBoost-IRL; " not in said
+
+
+def test_claim_that_depends_on_nothing_is_counted_alone() -> None:
+    """Where no choice has a share of the variance none is named; missing effects are told."""
+    many = without_twin(crossed(times=10))
+    table = effects(many, np.ones(len(many)), half=0.1, claim="STEADIER").assign(capped_x=0)
+    table.loc[:19, ["effect", "low", "high", "outcome"]] = [np.nan, np.nan, np.nan, UNDEFINED]
+    assert findings_at_once(table, many) == [
+        "- **Steadier than AdaBoost-IRL**: holds in 0 of 220 specifications (0%) that have an "
+        "effect (20 do not), is open in 0 and reversed in 220."
     ]
-    names = ["default", "ALPHA=0.1", "ALPHA=0.5", "TIES=first"]
+
+
+def test_findings_say_what_one_choice_moves() -> None:
+    """With one choice changed it is said what moves a claim, and how many changes cannot."""
+    many = without_twin(crossed(times=10))
+    names = ["default", "ALPHA=0.1", "ADABOOST-RULE=vote", "TIES=first"]
     single = pd.DataFrame(
         {
             "claim": ["FASTER"] * 4 + ["STEADIER"] * 2,
             "specification": [*names, *names[:2]],
+            "effect": [-2.0, -1.0, -2.0, 2.0, 1.0, 1.1],
+            "low": [-3.0, -2.0, -3.0, 1.0, 0.5, 0.6],
+            "high": [-1.0, 1.0, -1.0, 3.0, 1.5, 1.6],
             "outcome": [HOLDS, OPEN, HOLDS, REVERSED, OPEN, OPEN],
         }
     )
+    assert unchanged(single.head(4)).tolist() == [False, False, True, False]
     soccer = single.head(1).assign(claim="SAVES-SOCCER")
-    text = findings(outcomes, shares, levels, single, soccer).splitlines()
+    made = effects(many, np.ones(len(many)), half=0.1).assign(capped_x=0)
+    text = findings(made, many, single, soccer).splitlines()
     assert (
-        "- FASTER: holds with the defaults; reversed under TIES=first; open under ALPHA=0.1."
+        "- **Faster than AdaBoost-IRL**: holds with the defaults; reversed under TIES=first; open "
+        "under ALPHA=0.1. 1 of the 3 changes leave its numbers as they are."
     ) in text
-    assert "- STEADIER: open with the defaults; the same under every other value." in text
-    assert text[-1].startswith("- SAVES-SOCCER: holds with the defaults; the same")
+    assert "open with the defaults; the same under every other value. 0 of the 1" in "".join(text)
+    assert text[-1].startswith("- **Saves iterations**: holds with the defaults; the same")
     assert [line for line in text if line.endswith(":")] == [
         "All choices at once:",
         "One choice at a time, mazes:",
         "One choice at a time, soccer:",
     ]
+
+
+def test_every_choice_of_the_factorial_has_a_name() -> None:
+    """A choice that is added to the factorial has to be named in words, too."""
+    assert set(NAMES) == set(declared().mazes.factorial.choices)
+
+
+def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
+    """The rule of AdaBoost-IRL does not act on savings: its shares differ by chance alone."""
+    made = without_twin(crossed(RULES, times=20))
+    table = ruled("SAVES-OPEN", "mean-difference", {"mismatch": 0.0, "graded": 0.0})
+    table.loc[[0, 1, 2, 3], "outcome"] = HOLDS
+    said = chance(table, made)
+    held = table[table["outcome"] == HOLDS]["capped"].eq(10)
+    few, most = sorted((held.sum() / 40, (~held).sum() / 40))
+    assert f"with its 2 values in {few:.0%} to {most:.0%} of the specifications" in said
+
+
+# --- the published effects -------------------------------------------------------------------
+
+FIGURES = PROJECT / "figures"
+
+
+def test_published_tables_follow_from_the_published_effects() -> None:
+    """Outcomes, shares and levels are those of the files of effects, to the last digits."""
+    together, single, soccer = (
+        read_table(FIGURES / f"sensitivity_{name}.csv")
+        for name in ("factorial", "single", "soccer")
+    )
+    made = factorial_specifications(declared().mazes.factorial)
+    shares = variance_shares(together, made).merge(
+        variance_shares(together[together["capped"] == 0], made),
+        how="left",
+        on=["claim", "choice"],
+        suffixes=("", "_uncapped"),
+    )
+    due = {
+        "outcomes": outcome_shares(pd.concat([single, together, soccer])),
+        "shares": shares,
+        "levels": level_table(together, made),
+    }
+    for name, table in due.items():
+        stored = read_table(FIGURES / f"sensitivity_{name}.csv")
+        assert stored.columns.tolist() == table.columns.tolist()
+        for column in table:
+            if table[column].dtype.kind == "f":
+                np.testing.assert_allclose(stored[column], table[column], rtol=1e-7, atol=1e-9)
+            else:
+                assert stored[column].astype(str).tolist() == table[column].astype(str).tolist()
+
+
+def test_published_effects_have_their_outcomes() -> None:
+    """Every published outcome follows from its effect and interval, by the claim's margin."""
+    rows = pd.concat(
+        read_table(FIGURES / f"sensitivity_{name}.csv")
+        for name in ("factorial", "single", "soccer")
+    )
+    assert len(rows) == 8 * 240 + 8 * 44 + 3 * 19
+    for row in rows.itertuples():
+        assert row.outcome == _outcome(claims().by_id(row.claim), row.effect, row.low, row.high)
 
 
 # --- tiny runs -------------------------------------------------------------------------------
@@ -401,7 +497,8 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
         else:
             assert row.effect == pytest.approx((a - b).mean() if claim.y else a.mean())
         assert row.low <= row.effect <= row.high
-        assert row.capped == (x["converged"] == 0).sum() + (y["converged"] == 0).sum()
+        assert row.capped_x == (x["converged"] == 0).sum()
+        assert row.capped == row.capped_x + (y["converged"] == 0).sum()
         assert row.outcome == _outcome(claim, row.effect, row.low, row.high)
     second = {one: own for one, own in settings.items() if one.choices}
     some = effects_table(results, second, wanted)
@@ -424,6 +521,10 @@ def test_ablations_are_summaries_of_the_trials(tiny: Run) -> None:
         assert (row.mean, row.median) == (counts.mean(), np.median(counts))
         assert row.sd == pytest.approx(counts.std(ddof=1))
         assert row.low <= row.mean <= row.high
+        more = counts - results.iterations(next(iter(named.values())))
+        assert row.more == pytest.approx(more.mean())
+        assert row.more_low <= row.more <= row.more_high
+    assert (table.loc[0, ["more", "more_low", "more_high"]] == 0).all()
     assert table["capped"].iloc[-1] > 0
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from replication import Demos, Maze, demonstrate
 from replication.comparisons import F_INDICES, Key, method_settings, set_settings
 from replication.paper import TABLE_1
+from replication.paths import PROJECT
 from replication.setting import Setting
 from replication.statistics import compare, holm
 from replication.tables import (
@@ -207,9 +209,14 @@ JUDGED = pd.DataFrame(
         ("D", "Mean", "published-mean", "", 44.0, 43.0, 45.0, 44.94, "not testable"),
         ("E", "A run", "published-run", "printed", 41.0, 30.5, 55.0, 47.0, "not testable"),
         ("E", "A run", "published-run", "updated", np.nan, np.nan, np.nan, 47.0, "not testable"),
+        ("F", "SD", "published-sd", "printed", 6.8, 6.0, 7.7, 4.73, "not testable"),
+        ("F", "SD", "published-sd", "updated", 5.5, 4.8, 6.3, 4.73, "reproduced"),
     ],
     columns=["id", "claim", "statistic", "F", "effect", "low", "high", "paper", "verdict"],
-).assign(place="Fig. 6", why=["", "", "", "a", "", "", "it was used", "two capped", "all capped"])
+).assign(
+    place="Fig. 6",
+    why=["", "", "", "a", "", "", "it was used", "two capped", "all capped", "calibrated", ""],
+)
 
 
 def test_readable_verdicts_by_hand() -> None:
@@ -241,16 +248,31 @@ def test_readable_verdicts_by_hand() -> None:
         ["Q grows", "–", "0.10 [-0.10, 0.30]", "0.20 [-0.10, 0.50]", "not reproduced"],
         ["Mean", "44.94", "44.00 [43.00, 45.00]", "–", "not testable: it was used"],
         ["A run", "47.00", "median 41; 30 to 55", "–", "not testable: two capped"],
+        ["SD", "4.73", "6.80 [6.00, 7.70]", "5.50 [4.80, 6.30]", "not testable: calibrated"],
     ]
 
 
 def test_verdict_lines_have_the_verdict_first() -> None:
-    """On a terminal there is a line a claim, in the order of the table."""
-    found = verdict_lines(JUDGED)
-    assert found[1] == "partly         It is steadier (Fig. 6)"
-    for line, (_, part) in zip(found, JUDGED.groupby("id"), strict=True):
-        assert line[:15].rstrip() == overall(part["verdict"].tolist())
-        assert line[15:] == f"{part['claim'].iloc[0]} (Fig. 6)"
+    """On a terminal there is a line a claim: verdict, the paper's value, ours, and the claim."""
+    head, *found = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
+    assert head.split() == ["verdict", "paper", "Fᵢ", "(printed)", "Fᵢ₊₁", "(updated)", "claim"]
+    assert re.split(r"  +", found[1]) == [
+        "partly",
+        "× 0.46",
+        "× 0.50 [0.40, 0.60]",
+        "× 0.90 [0.80, 1.10]",
+        "steadier than AdaBoost-IRL",
+    ]
+    for line, (id, part) in zip(found, JUDGED.groupby("id"), strict=True):
+        assert line[:16].rstrip() == overall(part["verdict"].tolist())
+        assert line.endswith(str(id)) or id == "B"
+
+
+def test_published_verdicts_fit_on_a_terminal() -> None:
+    """No line of the published verdicts is longer than 100 columns, and no two columns touch."""
+    for line in verdict_lines(read_table(PROJECT / "figures" / "claims.csv")):
+        assert len(line) <= 100
+        assert len(re.split(r"  +", line)) == 5
 
 
 def test_verdicts_read_the_same_from_a_file(tmp_path: Path) -> None:
@@ -276,14 +298,17 @@ def test_readable_outcomes_by_hand() -> None:
             "undefined": [0, 1],
             "share": [0.9, 0.8],
             "with_caps": [0, 7],
+            "uncapped": [44, 232],
+            "holds_uncapped": [40, 194],
+            "unchanged": [5, 0],
             "median": [-4.0, -3.456],
             "lowest": [-9.0, -20.0],
             "highest": [1.0, 2.5],
         }
     )
     assert readable_outcomes(table).to_numpy().tolist() == [
-        ["FASTER", "one at a time", 44, 40, 3, 1, 0, 0, "-4.00 (-9.00, 1.00)"],
-        ["FASTER", "all at once", 240, 200, 30, 9, 1, 7, "-3.46 (-20.00, 2.50)"],
+        ["FASTER", "one at a time", 44, 40, 3, 1, 0, 0, "40 of 44", 5, "-4.00 (-9.00, 1.00)"],
+        ["FASTER", "all at once", 240, 200, 30, 9, 1, 7, "194 of 232", 0, "-3.46 (-20.00, 2.50)"],
     ]
 
 
@@ -319,6 +344,9 @@ def test_readable_ablations_by_hand() -> None:
             "high": [42.0],
             "sd": [4.5],
             "median": [39.5],
+            "more": [1.0],
+            "more_low": [-0.5],
+            "more_high": [2.5],
         }
     )
     assert readable_ablations(table).iloc[0].tolist() == [
@@ -327,6 +355,7 @@ def test_readable_ablations_by_hand() -> None:
         "4.50",
         "39.5",
         "2 of 30",
+        "1.00 [-0.50, 2.50]",
     ]
 
 
