@@ -7,12 +7,14 @@ interrupted one 130. Modules that take long to import are imported by the comman
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
 import signal
 import sys
 import textwrap
+import time
 import warnings
 from collections.abc import Sequence
 from enum import StrEnum
@@ -25,6 +27,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from replication import paths
+
+CLEANING = 5.0
+"""Seconds after an interruption in which another one is not heard: a run is then cleaning up."""
 
 
 class Profile(StrEnum):
@@ -150,10 +155,7 @@ def run(
     from replication.notebooks import RunError
     from replication.regenerate import executed_folder, run_name, run_notebooks
 
-    # A polite kill ends like Ctrl-C: the kernel and its workers stop, and the stage is removed.
-    signal.signal(signal.SIGTERM, _interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+    _catch_signals()
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
     values = _values(parameters)
     name = run_name(profile.value, seed=seed, parameters=values)
@@ -224,6 +226,7 @@ def verify(
 
     from replication.verification import verify as check_all
 
+    _catch_signals()
     target = out or _outputs(profile)
     store = paths.PROJECT / "build" / "trials.sqlite"
     wrong = check_all(target, store, jobs=jobs or joblib.cpu_count(), echo=typer.echo)
@@ -497,11 +500,20 @@ def _short(path: Path) -> str:
     return os.path.relpath(absolute) if below else str(absolute)
 
 
-def _interrupt(*_: object) -> NoReturn:
-    """Interrupt a run, once: what follows stops the kernel and cleans up, which takes a second."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
+def _catch_signals() -> None:
+    """Let a polite kill end like Ctrl-C: kernel and workers stop, and the stage is removed."""
+    last = -math.inf
+
+    def interrupt(*_: object) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > CLEANING:
+            last = now
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
 
 
 def _fail(message: str, code: int = 2) -> NoReturn:

@@ -26,6 +26,7 @@ from nbformat.reader import NotJSONError
 from papermill.exceptions import PapermillExecutionError
 
 from replication import paths
+from replication.engine import ENGINE
 from replication.executed import drop_empty_tags
 from replication.files import write_file
 from replication.notebooks import Notebook, RunError, first_line, refuse
@@ -81,7 +82,8 @@ def execute(
     RunError
         If a cell failed, took too long or killed its kernel.
     """
-    with tempfile.TemporaryDirectory(prefix="replicate-") as scratch:
+    # A kernel that is being killed may still write there.
+    with tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch:
         draft, events = (
             Path(scratch) / f"{notebook.name}.ipynb",
             Path(scratch) / "events",
@@ -159,6 +161,7 @@ def _execute(notebook: Notebook, values: Mapping[str, Any], draft: Path, timeout
                 copy.deepcopy(notebook.node),
                 str(draft).replace("{", "{{").replace("}", "}}"),  # papermill fills these in
                 parameters=dict(values),
+                engine_name=ENGINE,
                 kernel_name=KERNEL,
                 language="python",
                 progress_bar=False,

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -266,6 +267,23 @@ def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
     assert list(scratch.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid.read_text()), 0)
+
+
+def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second Ctrl-C does not disturb the cleaning up, and one that comes later is heard."""
+    handlers: dict[int, Callable[[], object]] = {}
+    clock = [100.0]
+    monkeypatch.setattr(signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    cli._catch_signals()
+    interrupt = handlers[signal.SIGTERM]
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    clock[0] += cli.CLEANING / 2
+    interrupt()
+    clock[0] += cli.CLEANING
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
 
 
 def test_what_is_fresh_is_not_run(project: Path) -> None:
