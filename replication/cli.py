@@ -152,14 +152,16 @@ def run(
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
     and store) to build/custom.
     """
+    from replication.folders import executed_folder, outputs_folder
     from replication.notebooks import RunError
-    from replication.regenerate import executed_folder, run_name, run_notebooks
+    from replication.regenerate import run_notebooks
+    from replication.runs import run_name
 
     _catch_signals()
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
     values = _values(parameters)
     name = run_name(profile.value, seed=seed, parameters=values)
-    target = out or (_outputs(profile) if name == profile.value else paths.PROJECT / "build/custom")
+    target = out or outputs_folder(name)
     try:
         published = run_notebooks(
             list(dict.fromkeys(files)),
@@ -201,13 +203,16 @@ def status(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
 ) -> None:
     """Say which figures and tables are up to date, why others are not, and what to do."""
-    from replication.regenerate import executed_folder, prepare
+    from replication.folders import executed_folder, outputs_folder
+    from replication.runs import prepare
     from replication.status import status_lines
 
-    target = out or _outputs(profile)
-    runs = prepare(_all_notebooks(), profile=profile.value)
-    folder = executed_folder(target, profile.value)
-    typer.echo("\n".join(status_lines(runs, target, folder)))
+    target = out or outputs_folder(profile)
+    runs = prepare(_all_notebooks(), profile=profile)
+    folder = executed_folder(target, profile)
+    options = ["--profile", profile.value] if profile is not Profile.PAPER else []
+    options += ["--out", str(out)] if out else []
+    typer.echo("\n".join(status_lines(runs, target, folder, options)))
 
 
 @app.command(epilog="Example: replicate verify")
@@ -224,12 +229,15 @@ def verify(
     """
     import joblib
 
-    from replication.verification import verify as check_all
+    from replication import verification
+    from replication.folders import outputs_folder
+    from replication.runs import prepare
 
     _catch_signals()
-    target = out or _outputs(profile)
+    runs, target = prepare(_all_notebooks(), profile=profile), out or outputs_folder(profile)
     store = paths.PROJECT / "build" / "trials.sqlite"
-    wrong = check_all(target, store, jobs=jobs or joblib.cpu_count(), echo=typer.echo)
+    jobs = jobs or joblib.cpu_count()
+    wrong = verification.verify(runs, target, store, jobs=jobs, echo=typer.echo)
     for one in wrong:
         typer.echo(f"error: {one}", err=True)
     typer.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
@@ -246,21 +254,13 @@ def clean(
         bool, typer.Option("--dry-run", help="Only say what would be removed.")
     ] = False,
 ) -> None:
-    """Remove files among the outputs that no notebook declares."""
-    from replication.regenerate import prepare
-    from replication.status import undeclared
+    """Remove files among the outputs that no notebook declares, and records of lost notebooks."""
+    from replication import cleaning
+    from replication.folders import outputs_folder
+    from replication.runs import prepare
 
-    target = out or _outputs(profile)
-    for path in undeclared(prepare(_all_notebooks(), profile=profile.value), target):
-        if not dry_run:
-            path.unlink()
-        typer.echo(f"{'would remove' if dry_run else 'removed'} {_short(path)}")
-
-
-def _outputs(profile: Profile) -> Path:
-    """Return the folder that a profile's outputs go to."""
-    paper = profile is Profile.PAPER
-    return paths.PROJECT / ("figures" if paper else f"build/{profile.value}")
+    runs = prepare(_all_notebooks(), profile=profile)
+    cleaning.clean(runs, out or outputs_folder(profile), dry_run=dry_run, echo=typer.echo)
 
 
 @app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")

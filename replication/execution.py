@@ -7,7 +7,6 @@ cell ids in every run.
 
 from __future__ import annotations
 
-import copy
 import json
 import logging
 import os
@@ -158,7 +157,7 @@ def _execute(notebook: Notebook, values: Mapping[str, Any], draft: Path, timeout
     for attempt in range(1, STARTS + 1):
         try:
             node = papermill.execute_notebook(
-                copy.deepcopy(notebook.node),
+                notebook.load(),
                 str(draft).replace("{", "{{").replace("}", "}}"),  # papermill fills these in
                 parameters=dict(values),
                 engine_name=ENGINE,
@@ -209,7 +208,7 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
     """Return the executed notebook without what differs between equal runs."""
     node = nbformat.read(draft, as_version=4)
     node.metadata.pop("papermill", None)
-    known = {cell.get("id") for cell in notebook.node.cells}
+    known = {cell.get("id") for cell in notebook.load().cells}
     added = 0
     for cell in node.cells:
         cell.metadata.pop("papermill", None)

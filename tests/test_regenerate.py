@@ -21,8 +21,9 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import Demos, execution, paths
 from replication.files import write_file
+from replication.freshness import read_runs
 from replication.notebooks import Notebook, NotebookError, RunError
-from replication.regenerate import read_runs, run_notebooks
+from replication.regenerate import run_notebooks
 from replication.verification import verify_outputs
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
@@ -371,13 +372,14 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     ) -> None:
         begun.append(notebook.name)
         names: dict[str, Any] = {}
-        for at, cell in enumerate(notebook.node.cells):
+        node = notebook.load()
+        for at, cell in enumerate(node.cells):
             if cell.cell_type == "code":
                 cell.execution_count = len(begun)
                 exec(cell.source, names)
             if at == notebook.at:
                 names |= {**values, "out": str(stage)}
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(node)))
 
     monkeypatch.setattr(execution, "execute", execute)
     return begun

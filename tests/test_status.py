@@ -10,10 +10,12 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import execution, paths, status
+from replication.cleaning import undeclared
 from replication.files import write_file
 from replication.notebooks import Notebook
-from replication.regenerate import prepare, run_notebooks
-from replication.status import status_lines, undeclared
+from replication.regenerate import run_notebooks
+from replication.runs import prepare
+from replication.status import status_lines
 
 
 @pytest.fixture
@@ -23,7 +25,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
         for name in notebook.outputs:
             (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(notebook.load())))
 
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     monkeypatch.setattr(execution, "execute", execute)
