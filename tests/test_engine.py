@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import nbformat
@@ -35,8 +34,8 @@ def kernels(parent: int) -> list[int]:
     return found
 
 
-def interrupted(project: Path, begun: Callable[[int], object], seconds: float) -> None:
-    """Interrupt a run some seconds after it has begun, and check how it ends."""
+def interrupted(project: Path, seconds: float, *, starting: bool) -> None:
+    """Interrupt a run some seconds after its cell or kernel has begun; check how it ends."""
     cells = [
         new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
         new_code_cell(
@@ -58,7 +57,9 @@ def interrupted(project: Path, begun: Callable[[int], object], seconds: float) -
         env=os.environ | {"TMPDIR": str(scratch)},
     )
     end = time.monotonic() + 120
-    while not begun(process.pid) and process.poll() is None and time.monotonic() < end:
+    while not (kernels(process.pid) if starting else (project / "begun").exists()):
+        assert process.poll() is None
+        assert time.monotonic() < end
         time.sleep(0.001)
     time.sleep(seconds)
     started = kernels(process.pid)
@@ -74,14 +75,13 @@ def interrupted(project: Path, begun: Callable[[int], object], seconds: float) -
 def check_ticks(folder: Path, moments: list[float]) -> None:
     """Interrupt a cell at moments about the one at which nbclient looks after the kernel."""
     for moment in moments:
-        project = folder / f"{moment:.3f}"
-        interrupted(project, lambda _, begun=project / "begun": begun.exists(), moment)
+        interrupted(folder / f"{moment:.3f}", moment, starting=False)
 
 
 def check_starts(folder: Path, moments: list[float]) -> None:
     """Interrupt a run while its kernel starts."""
     for moment in moments:
-        interrupted(folder / f"{moment:.3f}", kernels, moment)
+        interrupted(folder / f"{moment:.3f}", moment, starting=True)
 
 
 def test_nobody_complains_of_a_kernel_that_was_ended(tmp_path: Path) -> None:
