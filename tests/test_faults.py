@@ -6,6 +6,7 @@ import json
 import os
 import re
 import resource
+import shlex
 import shutil
 import signal
 import socket
@@ -584,6 +585,58 @@ def test_no_network_is_used(checkout: Checkout, reference: Reference) -> None:
     assert seen == {"127.0.0.1"}
     assert not log.exists()
     assert checkout.results() == reference.results
+
+
+def test_the_cluster_of_the_readme(checkout: Checkout, reference: Reference) -> None:
+    """Its commands listen on loopback only; with a worker killed on the way, no byte differs."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^ +\.venv/bin/dask (.+) &$", text.replace("8786", port), re.MULTILINE)
+    environment = os.environ | {
+        "FAULTS_MARK": checkout.mark,
+        "PYTHONPATH": str(checkout.folder),
+        "TMPDIR": str(checkout.scratch),
+        "TOY_NOTES": str(checkout.notes),
+    }
+    cluster = [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *shlex.split(command)],
+            cwd=checkout.scratch,
+            env=environment | {"TOY_PAUSE": "0.3"},
+            stderr=subprocess.DEVNULL,
+        )
+        for command in commands
+    ]
+    try:
+        assert len(cluster) == 2
+        assert wait(lambda: len(_children(cluster[1].pid)) == 2)
+        run = checkout.start("run", "--scheduler", f"tcp://127.0.0.1:{port}")
+        assert wait(lambda: checkout.computed)
+        assert _listening(checkout.mark) == {"127.0.0.1"}
+        os.kill(_children(cluster[1].pid)[0], signal.SIGKILL)
+        complained = run.communicate(timeout=120)[1]
+        assert run.returncode == 0, complained
+        assert checkout.results() == reference.results
+    finally:
+        for process in reversed(cluster):
+            process.terminate()
+            process.wait(timeout=60)
+    assert gone(checkout.mark)
+
+
+def _children(parent: int) -> list[int]:
+    """Return the worker processes that `dask worker` has started."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            own = (folder / "stat").read_text().rpartition(")")[2].split()[1] == str(parent)
+            if own and b"spawn_main" in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found
 
 
 CLOCK = """

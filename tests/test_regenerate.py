@@ -730,9 +730,7 @@ def test_a_module_that_is_edited_during_the_run_is_noticed(
     package.mkdir()
     (package / "mine.py").write_text("a = 1")
     monkeypatch.setattr(provenance, "__file__", str(package / "provenance.py"))
-    edit = (
-        "from replication.paths import PROJECT\n(PROJECT / 'package/mine.py').write_text('a = 2')"
-    )
+    edit = f"Path({str(package / 'mine.py')!r}).write_text('a = 2')"
     path = toy(write, f"{edit}\nif False: import replication.mine\nvalue = 1")
     with pytest.raises(RunError, match=r"replication\.mine has changed during the run"):
         run(path)
