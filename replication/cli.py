@@ -6,6 +6,7 @@ interrupted one 130. Modules that take long to import are imported by the comman
 
 from __future__ import annotations
 
+import atexit
 import json
 import math
 import os
@@ -511,6 +512,9 @@ def _catch_signals() -> None:
             last = now
             raise KeyboardInterrupt
 
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # While the interpreter ends, it would else give up this handler, and die of the signal.
+        atexit.register(signal.signal, number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, interrupt)

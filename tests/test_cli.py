@@ -1,5 +1,6 @@
 """The command line: what it prints, where it writes and how it ends."""
 
+import atexit
 import json
 import os
 import re
@@ -275,6 +276,7 @@ def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.Monke
     handlers: dict[int, Callable[[], object]] = {}
     clock = [100.0]
     monkeypatch.setattr(signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(atexit, "register", lambda *_: None)
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     cli._catch_signals()
     interrupt = handlers[signal.SIGTERM]

@@ -248,7 +248,7 @@ def test_merged_file_is_there_when_the_notebook_starts(
     [
         ("raise KeyError('gone')", r"toy\.ipynb: cell 5 failed: KeyError: 'gone'"),
         ("os.kill(os.getpid(), 9)", r"toy\.ipynb: cell 5: the kernel was killed.*memory"),
-        ("import time; time.sleep(60)", r"toy\.ipynb: cell 5 took more than 2 seconds.*--timeout"),
+        ("import time; time.sleep(60)", r"toy\.ipynb: cell 5 took more than 8 seconds.*--timeout"),
         ("sys.exit()", r"toy\.ipynb: cell 5 ended the notebook before its last cell"),
         ("(folder / 'c').mkdir()", r"toy\.ipynb: written but not declared: c$"),
         ("(folder / 'a.txt').unlink()", r"toy\.ipynb: declared but not written: a\.txt$"),
@@ -263,7 +263,7 @@ def test_failure_leaves_earlier_outputs(
     earlier.write_text("earlier")
     path = write("(folder / 'a.txt').write_text('new')", code, "done = 1", outputs=["a.txt"])
     with pytest.raises(RunError, match=message) as caught:
-        run(path, timeout=2)
+        run(path, timeout=8)
     assert earlier.read_text() == "earlier"
     assert files(earlier.parent) == ["a.txt"]
     assert (tmp_path / "executed" / "toy.ipynb").exists()
