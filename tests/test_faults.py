@@ -402,6 +402,28 @@ def test_ctrl_c_keeps_what_is_finished(
     assert len(checkout.computed) == TASKS * TRIALS - len(kept)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
+    """However verify is ended, so are the processes that compute for it."""
+    demos = Path(__file__).parents[1] / "data" / "demos" / "open_maze.json"
+    shutil.copy2(demos, checkout.folder / "data" / "demos")
+    rows = [f"open-maze,unified,{k},1,9,True,9,,sha256:0\n" for k in range(2000)]
+    (checkout.folder / "figures").mkdir()
+    (checkout.folder / "figures" / "trials.csv").write_text(
+        "task,method,trial,seed,iterations,converged,steps,choices,digest\n" + "".join(rows)
+    )
+    process = checkout.start("verify", "--jobs", "2")
+    assert wait(lambda: len(alive(checkout.mark)) >= 3, 300)
+    process.send_signal(number)
+    complained = process.communicate(timeout=60)[1]
+    if number == signal.SIGKILL:
+        assert process.returncode == -signal.SIGKILL
+    else:
+        assert process.returncode == 130
+        assert complained == "error: interrupted\n"
+    assert gone(checkout.mark)
+
+
 def test_a_second_run_waits_for_the_first(checkout: Checkout, reference: Reference) -> None:
     """Of two runs at once, the second says that it waits, and then finds everything fresh."""
     checkout.gate.touch()

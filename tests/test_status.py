@@ -225,3 +225,11 @@ def test_what_is_badly_remembered_is_forgotten(project: Path, entry: str) -> Non
     run(project, "maze")
     (project / "done" / "run.json").write_text(f'{{"maze": {entry}}}')
     assert lines(project)[:2] == ["maze: stale", "    because its last run did not finish"]
+
+
+def test_what_this_repository_publishes_is_fresh(tmp_path: Path) -> None:
+    """In a fresh clone, in which nothing has run, every figure and table is up to date."""
+    notebooks = sorted((paths.PROJECT / "notebooks").glob("*.ipynb"))
+    runs = prepare(notebooks, profile="paper")
+    found = status_lines(runs, paths.PROJECT / "figures", tmp_path)
+    assert found[-1] == "everything is fresh; replicate verify proves it", "\n".join(found)
