@@ -6,13 +6,16 @@ interrupted one 130. Modules that take long to import are imported by the comman
 
 from __future__ import annotations
 
+import atexit
 import json
+import math
 import os
 import re
 import shutil
 import signal
 import sys
 import textwrap
+import time
 import warnings
 from collections.abc import Sequence
 from enum import StrEnum
@@ -25,6 +28,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from replication import paths
+
+CLEANING = 5.0
+"""Seconds after an interruption in which another one is not heard: a run is then cleaning up."""
 
 
 class Profile(StrEnum):
@@ -135,6 +141,10 @@ def run(
         bool,
         typer.Option("--force", help="Run what is up to date, too; compute every trial again."),
     ] = False,
+    here: Annotated[
+        bool,
+        typer.Option("--here", help="Run what is up to date, too, if it was made elsewhere."),
+    ] = False,
     scheduler: Annotated[
         str,
         typer.Option(metavar="ADDRESS", help="Send trials to a Dask scheduler: tcp://HOST:PORT."),
@@ -147,17 +157,16 @@ def run(
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
     and store) to build/custom.
     """
+    from replication.folders import executed_folder, outputs_folder
     from replication.notebooks import RunError
-    from replication.regenerate import executed_folder, run_name, run_notebooks
+    from replication.regenerate import run_notebooks
+    from replication.runs import run_name
 
-    # A polite kill ends like Ctrl-C: the kernel and its workers stop, and the stage is removed.
-    signal.signal(signal.SIGTERM, _interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+    _catch_signals()
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
     values = _values(parameters)
     name = run_name(profile.value, seed=seed, parameters=values)
-    target = out or (_outputs(profile) if name == profile.value else paths.PROJECT / "build/custom")
+    target = out or outputs_folder(name)
     try:
         published = run_notebooks(
             list(dict.fromkeys(files)),
@@ -168,6 +177,7 @@ def run(
             parameters=values,
             timeout=timeout,
             force=force,
+            here=here,
             scheduler=scheduler,
             echo=typer.echo,
         )
@@ -199,13 +209,16 @@ def status(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
 ) -> None:
     """Say which figures and tables are up to date, why others are not, and what to do."""
-    from replication.regenerate import executed_folder, prepare
+    from replication.folders import executed_folder, outputs_folder
+    from replication.runs import prepare
     from replication.status import status_lines
 
-    target = out or _outputs(profile)
-    runs = prepare(_all_notebooks(), profile=profile.value)
-    folder = executed_folder(target, profile.value)
-    typer.echo("\n".join(status_lines(runs, target, folder)))
+    target = out or outputs_folder(profile)
+    runs = prepare(_all_notebooks(), profile=profile)
+    folder = executed_folder(target, profile)
+    options = ["--profile", profile.value] if profile is not Profile.PAPER else []
+    options += ["--out", str(out)] if out else []
+    typer.echo("\n".join(status_lines(runs, target, folder, options)))
 
 
 @app.command(epilog="Example: replicate verify")
@@ -222,11 +235,15 @@ def verify(
     """
     import joblib
 
-    from replication.verification import verify as check_all
+    from replication import verification
+    from replication.folders import outputs_folder
+    from replication.runs import prepare
 
-    target = out or _outputs(profile)
+    _catch_signals()
+    runs, target = prepare(_all_notebooks(), profile=profile), out or outputs_folder(profile)
     store = paths.PROJECT / "build" / "trials.sqlite"
-    wrong = check_all(target, store, jobs=jobs or joblib.cpu_count(), echo=typer.echo)
+    jobs = jobs or joblib.cpu_count()
+    wrong = verification.verify(runs, target, store, jobs=jobs, echo=typer.echo)
     for one in wrong:
         typer.echo(f"error: {one}", err=True)
     typer.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
@@ -243,15 +260,13 @@ def clean(
         bool, typer.Option("--dry-run", help="Only say what would be removed.")
     ] = False,
 ) -> None:
-    """Remove files among the outputs that no notebook declares."""
-    from replication.regenerate import prepare
-    from replication.status import undeclared
+    """Remove files among the outputs that no notebook declares, and records of lost notebooks."""
+    from replication import cleaning
+    from replication.folders import outputs_folder
+    from replication.runs import prepare
 
-    target = out or _outputs(profile)
-    for path in undeclared(prepare(_all_notebooks(), profile=profile.value), target):
-        if not dry_run:
-            path.unlink()
-        typer.echo(f"{'would remove' if dry_run else 'removed'} {_short(path)}")
+    runs = prepare(_all_notebooks(), profile=profile)
+    cleaning.clean(runs, out or outputs_folder(profile), dry_run=dry_run, echo=typer.echo)
 
 
 @app.command(epilog="Example: replicate site")
@@ -265,12 +280,6 @@ def site(
 
     first = build_site(_all_notebooks(), out, echo=typer.echo)
     typer.echo(f"open {first.resolve().as_uri()} in a browser")
-
-
-def _outputs(profile: Profile) -> Path:
-    """Return the folder that a profile's outputs go to."""
-    paper = profile is Profile.PAPER
-    return paths.PROJECT / ("figures" if paper else f"build/{profile.value}")
 
 
 @app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")
@@ -510,11 +519,23 @@ def _short(path: Path) -> str:
     return os.path.relpath(absolute) if below else str(absolute)
 
 
-def _interrupt(*_: object) -> NoReturn:
-    """Interrupt a run, once: what follows stops the kernel and cleans up, which takes a second."""
+def _catch_signals() -> None:
+    """Let a polite kill end like Ctrl-C: kernel and workers stop, and the stage is removed."""
+    last = -math.inf
+
+    def interrupt(*_: object) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > CLEANING:
+            last = now
+            raise KeyboardInterrupt
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
+        # While the interpreter ends, it would else give up this handler, and die of the signal.
+        atexit.register(signal.signal, number, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
 
 
 def _fail(message: str, code: int = 2) -> NoReturn:

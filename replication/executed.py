@@ -7,18 +7,13 @@ instead, so that it is small, can be kept under version control and is read with
 from __future__ import annotations
 
 import base64
-import copy
 import re
 from pathlib import Path
 from typing import Any
 
 import nbformat
 
-from replication.files import write_file
-from replication.notebooks import Notebook
-
-INJECTED = "injected-parameters"
-"""The tag that papermill gives to its own cell."""
+from replication.notebooks import INJECTED, Notebook
 
 
 def linked(executed: Path, files: Path) -> str:
@@ -48,12 +43,12 @@ def linked(executed: Path, files: Path) -> str:
     return str(nbformat.writes(node)) + "\n"
 
 
-def render(notebook: Notebook, executed: Path) -> None:
-    """Bring the prose of an executed notebook up to date; nothing is executed."""
+def rendered(notebook: Notebook, executed: Path) -> str:
+    """Return an executed notebook with the prose of the notebook; nothing is executed."""
     node = nbformat.read(executed, as_version=4)
     code = [cell for cell in node.cells if cell.cell_type == "code"]
     cells = []
-    for at, cell in enumerate(copy.deepcopy(notebook.node.cells)):
+    for at, cell in enumerate(notebook.load().cells):
         drop_empty_tags(cell)
         cells.append(cell)
         if cell.cell_type != "code":
@@ -63,14 +58,7 @@ def render(notebook: Notebook, executed: Path) -> None:
         if at == notebook.at and code and _is_injected(code[0]):
             cells.append(code.pop(0))
     node.cells = cells
-    write_file(executed, str(nbformat.writes(node)) + "\n")
-
-
-def shows(executed: Path, notebook: Notebook) -> bool:
-    """Return whether an executed notebook has the same text and code as the notebook."""
-    cells = nbformat.read(executed, as_version=4).cells
-    text = [cell.source for cell in cells if not _is_injected(cell)]
-    return text == [cell.source for cell in notebook.node.cells]
+    return str(nbformat.writes(node)) + "\n"
 
 
 def drop_empty_tags(cell: Any) -> None:

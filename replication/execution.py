@@ -7,7 +7,6 @@ cell ids in every run.
 
 from __future__ import annotations
 
-import copy
 import json
 import logging
 import os
@@ -26,6 +25,7 @@ from nbformat.reader import NotJSONError
 from papermill.exceptions import PapermillExecutionError
 
 from replication import paths
+from replication.engine import ENGINE
 from replication.executed import drop_empty_tags
 from replication.files import write_file
 from replication.notebooks import Notebook, RunError, first_line, refuse
@@ -81,7 +81,8 @@ def execute(
     RunError
         If a cell failed, took too long or killed its kernel.
     """
-    with tempfile.TemporaryDirectory(prefix="replicate-") as scratch:
+    # A kernel that is being killed may still write there.
+    with tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch:
         draft, events = (
             Path(scratch) / f"{notebook.name}.ipynb",
             Path(scratch) / "events",
@@ -156,9 +157,10 @@ def _execute(notebook: Notebook, values: Mapping[str, Any], draft: Path, timeout
     for attempt in range(1, STARTS + 1):
         try:
             node = papermill.execute_notebook(
-                copy.deepcopy(notebook.node),
+                notebook.load(),
                 str(draft).replace("{", "{{").replace("}", "}}"),  # papermill fills these in
                 parameters=dict(values),
+                engine_name=ENGINE,
                 kernel_name=KERNEL,
                 language="python",
                 progress_bar=False,
@@ -206,7 +208,7 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
     """Return the executed notebook without what differs between equal runs."""
     node = nbformat.read(draft, as_version=4)
     node.metadata.pop("papermill", None)
-    known = {cell.get("id") for cell in notebook.node.cells}
+    known = {cell.get("id") for cell in notebook.load().cells}
     added = 0
     for cell in node.cells:
         cell.metadata.pop("papermill", None)

@@ -30,9 +30,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import nbformat
-
 from replication.choices import unknown_name
+
+INJECTED = "injected-parameters"
+"""The tag that papermill gives to its own cell."""
 
 
 class NotebookError(ValueError):
@@ -48,13 +49,24 @@ class RunError(RuntimeError):
 
 
 @dataclass(frozen=True)
+class Cell:
+    """The kind of a cell ("code", "markdown" or "raw"), its text and its tags."""
+
+    kind: str
+    source: str
+    tags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Notebook:
-    """A notebook that was read and checked.
+    """A notebook that was read, and whose declarations were checked.
 
     Attributes
     ----------
-    path, node
-        Its file and contents.
+    path, text
+        Its file and what that holds.
+    cells
+        Its cells.
     at
         Index of the parameters cell.
     literals
@@ -68,7 +80,8 @@ class Notebook:
     """
 
     path: Path
-    node: Any
+    text: str
+    cells: tuple[Cell, ...]
     at: int
     literals: Mapping[str, Any]
     outputs: tuple[str, ...]
@@ -90,6 +103,31 @@ class Notebook:
     def published(self) -> tuple[str, ...]:
         """All files that a run publishes: the outputs, and the executed notebook."""
         return (*self.outputs, self.executed)
+
+    def load(self) -> Any:
+        """Return the contents as nbformat has them.
+
+        Raises
+        ------
+        NotebookError
+            If nbformat finds them invalid.
+        """
+        import nbformat  # takes a second, which what is up to date need not wait for
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # older formats have no cell ids
+                node = nbformat.reads(self.text, as_version=4)
+                nbformat.validate(node)
+        except Exception as error:  # whatever the contents make the reader raise
+            refuse(self.path, f"is not a valid notebook: {first_line(error)}")
+        return node
+
+    def is_shown_by(self, executed: Path) -> bool:
+        """Return whether an executed notebook has the same text and code as this one."""
+        _, cells = _parsed(executed.read_text(encoding="utf-8"))
+        shown = [cell.source for cell in cells if INJECTED not in cell.tags]
+        return shown == [cell.source for cell in self.cells]
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse values of parameters that the notebook does not have, or of another type.
@@ -117,34 +155,30 @@ def read_notebook(path: Path) -> Notebook:
     Raises
     ------
     NotebookError
-        If the file is no valid notebook, does not have exactly one cell tagged `parameters`, if
-        that cell has a line other than `name = literal`, or if the declarations are not usable.
+        If the file is no notebook, does not have exactly one cell tagged `parameters`, if that
+        cell has a line other than `name = literal`, or if the declarations are not usable.
     """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # older formats have no cell ids
-            node = nbformat.read(path, as_version=4)
-            nbformat.validate(node)
+        text = path.read_text(encoding="utf-8")
+        metadata, cells = _parsed(text)
     except OSError as error:
         refuse(path, f"cannot be read: {(error.strerror or str(error)).lower()}")
     except Exception as error:  # whatever the contents make the reader raise
         refuse(path, f"is not a valid notebook: {first_line(error)}")
 
     tagged = [
-        at
-        for at, cell in enumerate(node.cells)
-        if cell.cell_type == "code" and "parameters" in cell.metadata.get("tags", [])
+        at for at, cell in enumerate(cells) if cell.kind == "code" and "parameters" in cell.tags
     ]
     if len(tagged) != 1:
         refuse(
             path,
             f"{len(tagged)} cells have the tag 'parameters'; exactly one must have it",
         )
-    literals = _literals(path, node.cells[tagged[0]].source)
+    literals = _literals(path, cells[tagged[0]].source)
     if not isinstance(literals.get("out"), str):
         refuse(path, "the parameters cell must have out = 'FOLDER', where the outputs go")
 
-    declared = node.metadata.get("replication")
+    declared = metadata.get("replication")
     if not isinstance(declared, dict) or "outputs" not in declared:
         refuse(path, 'its metadata do not declare {"replication": {"outputs": [...]}}')
     for key in declared:
@@ -160,12 +194,30 @@ def read_notebook(path: Path) -> Notebook:
     if not isinstance(inputs, list) or not all(isinstance(name, str) for name in inputs):
         refuse(path, "'inputs' must be a list of files")
     every = tuple(dict.fromkeys((*outputs, *merged)))
-    notebook = Notebook(path, node, tagged[0], literals, every, merged, tuple(inputs), profiles)
+    notebook = Notebook(
+        path, text, cells, tagged[0], literals, every, merged, tuple(inputs), profiles
+    )
     for profile, values in profiles.items():
         if "out" in values:
             refuse(path, f"profile {profile!r} sets 'out', which each run chooses")
         notebook.check(values)
     return notebook
+
+
+def _parsed(text: str) -> tuple[dict[str, Any], tuple[Cell, ...]]:
+    """Return the metadata and the cells of a notebook's file, which is plain JSON."""
+    document = json.loads(text)
+    if document["nbformat"] != 4:
+        raise ValueError(f"its format is {document['nbformat']}, not 4")
+    cells = [
+        Cell(
+            cell["cell_type"],
+            "".join(cell["source"]),  # one text, or its lines
+            tuple(cell["metadata"].get("tags", ())),
+        )
+        for cell in document["cells"]
+    ]
+    return dict(document["metadata"]), tuple(cells)
 
 
 def _literals(path: Path, source: str) -> dict[str, Any]:

@@ -14,7 +14,8 @@ import json
 import platform
 import sys
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -56,14 +57,16 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any]) -> Inputs:
     """
     cells = [  # the parameters cell keeps its place among them
         "" if at == notebook.at else cell.source
-        for at, cell in enumerate(notebook.node.cells)
-        if cell.cell_type == "code"
+        for at, cell in enumerate(notebook.cells)
+        if cell.kind == "code"
     ]
     parameters = {**notebook.literals, **values}
     files = [paths.PROJECT / name for name in notebook.inputs]
-    for value in parameters.values():
-        if isinstance(value, str) and value.endswith(".json"):
-            files.append(paths.resolve(value))
+    files += [
+        paths.resolve(value)
+        for name, value in parameters.items()
+        if name not in NEUTRAL and isinstance(value, str) and _is_file_name(value)
+    ]
     data = {}
     for file in files:
         try:
@@ -75,7 +78,7 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any]) -> Inputs:
         "cells": text_hash(json.dumps([bare_source(cell) for cell in cells])),
         "parameters": {k: v for k, v in sorted(parameters.items()) if k not in NEUTRAL},
         "outputs": sorted(notebook.outputs),
-        "source": _source_hashes(_imported(map(ast.parse, filter(_is_python, cells)))),
+        "source": _source_hashes(_imported(_trees(cells))),
         "data": dict(sorted(data.items())),
         "lock": file_hash(paths.PROJECT / "environment.lock"),
     }
@@ -99,36 +102,66 @@ def changes(before: Inputs, now: Inputs) -> list[str]:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Return what the manifest of a folder says of each notebook; empty if there is none.
 
-    A manifest that cannot be read counts as none: its outputs are then made again.
+    What cannot be read counts as not there: its outputs are then made again.
     """
     try:
         document = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         if (document["format"], document["version"]) == (FORMAT, VERSION):
-            return dict(document["notebooks"])
+            notebooks = dict(document["notebooks"])
+            return {name: entry for name, entry in notebooks.items() if _is_entry(entry)}
     except (OSError, ValueError, KeyError, TypeError):
         pass
     return {}
 
 
-def record(folder: Path, notebook: Notebook, inputs: Inputs) -> None:
-    """Enter a finished run into the manifest of the folder that holds its outputs."""
+def _is_entry(entry: Any) -> bool:
+    """Return whether what a manifest says of a notebook has the parts that are needed."""
+    try:
+        inputs, outputs = entry["inputs"], entry["outputs"]
+        parts = (outputs, inputs["parameters"], inputs["data"], inputs["source"])
+    except (KeyError, TypeError):
+        return False
+    return all(isinstance(part, dict) for part in parts)
+
+
+def record(folder: Path, notebook: Notebook, inputs: Inputs, shared: Mapping[str, str]) -> None:
+    """Enter a finished run into the manifest of the folder that holds its outputs.
+
+    A file that others merge has changed for them, too. Those whose rows were in it before the run
+    know it under its new hash; to the others it stays damaged.
+
+    Parameters
+    ----------
+    folder, notebook, inputs
+        The outputs, what has made them, and what they depend on.
+    shared
+        The hashes that the merged files had when the run began.
+    """
     notebooks = read_manifest(folder)
     outputs = {name: file_hash(folder / name) for name in sorted(notebook.published)}
+    for other in notebooks.values():
+        for name in notebook.merged:
+            if name in shared and other["outputs"].get(name) == shared[name]:
+                other["outputs"][name] = outputs[name]
     notebooks[notebook.name] = {
         "inputs": inputs,
         "outputs": outputs,
         "versions": versions(),
     }
-    for other in notebooks.values():  # a shared file has changed for all that share it
-        shared = other["outputs"].keys() & set(notebook.merged)
-        other["outputs"].update({name: outputs[name] for name in shared})
     _write_manifest(folder, notebooks)
 
 
-def rehash(folder: Path, notebook: str, name: str) -> None:
-    """Enter the hash of one published file of a notebook anew."""
+def rehash(folder: Path, notebook: str, name: str, text: str) -> None:
+    """Enter the hash of the text that one published file of a notebook is about to hold."""
     notebooks = read_manifest(folder)
-    notebooks[notebook]["outputs"][name] = file_hash(folder / name)
+    notebooks[notebook]["outputs"][name] = text_hash(text)
+    _write_manifest(folder, notebooks)
+
+
+def forget(folder: Path, names: Iterable[str]) -> None:
+    """Remove notebooks from the manifest of a folder."""
+    gone = set(names)
+    notebooks = {k: v for k, v in read_manifest(folder).items() if k not in gone}
     _write_manifest(folder, notebooks)
 
 
@@ -185,13 +218,20 @@ def _data_hash(path: Path) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _is_python(cell: str) -> bool:
-    """Return whether a cell can be parsed; if not, its run will say so."""
+def _is_file_name(value: str) -> bool:
+    """Return whether a parameter names a file; one of JSON is missed if it is not there."""
     try:
-        ast.parse(cell)
-    except SyntaxError:
+        return value.endswith(".json") or paths.resolve(value).is_file()
+    except OSError:  # a text that is too long to be a name
         return False
-    return True
+
+
+def _trees(cells: Iterable[str]) -> Iterator[ast.Module]:
+    """Yield cells as syntax trees, without magics; what is no Python its run will refuse."""
+    for cell in cells:
+        lines = [line for line in cell.splitlines() if not line.lstrip().startswith(("%", "!"))]
+        with suppress(SyntaxError):
+            yield ast.parse("\n".join(lines))
 
 
 def _imported(trees: Iterable[ast.Module]) -> list[str]:
@@ -216,6 +256,11 @@ def _source_hashes(names: Iterable[str]) -> dict[str, str]:
             found[name], imports = module
             waiting += imports
     return dict(sorted(found.items()))
+
+
+def forget_sources() -> None:
+    """Let every module be read again, since it may have been edited."""
+    _module.cache_clear()
 
 
 @cache

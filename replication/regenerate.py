@@ -8,115 +8,31 @@ goes on from there.
 from __future__ import annotations
 
 import datetime
-import fcntl
 import json
 import os
 import platform
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import joblib
 
 from replication import paths, provenance
-from replication.executed import linked, render, shows
 from replication.files import write_file
-from replication.notebooks import Notebook, NotebookError, RunError, read_notebook, refuse
+from replication.folders import DRAFT, exclusive, executed_folder, store_file
+from replication.freshness import FRESH, PROSE, read_runs, remember, state_of
+from replication.notebooks import Notebook, NotebookError, RunError, first_line, refuse
+from replication.runs import Run, departures, prepare, run_name
 
 TIMEOUT = 3600
 """Seconds that one cell may take unless told otherwise."""
-
-RUNS = "run.json"
-"""What differs from run to run, beside the executed notebooks."""
-
-LOCK = ".lock"
-
-FRESH, STALE, MISSING, PROSE = "fresh", "stale", "missing", "prose"
-
-
-@dataclass(frozen=True)
-class Run:
-    """A notebook with the parameters of a run, and everything that its outputs depend on."""
-
-    notebook: Notebook
-    values: Mapping[str, Any]
-    inputs: provenance.Inputs
-
-
-@dataclass(frozen=True)
-class State:
-    """Whether the outputs of a notebook are up to date.
-
-    `kind` is "fresh", "stale", "missing", or "prose" where only text has changed that is not
-    executed; `why` says what has changed.
-    """
-
-    kind: str
-    why: tuple[str, ...] = ()
-
-
-# --- running ---------------------------------------------------------------------------------
-
-
-def run_name(
-    profile: str,
-    *,
-    seed: int | None = None,
-    parameters: Mapping[str, Any] | None = None,
-) -> str:
-    """Name what a run is: its profile, or "custom" where a result may differ from the profile's.
-
-    Examples
-    --------
-    >>> run_name("paper", parameters={"jobs": 2}), run_name("paper", parameters={"trials": 2})
-    ('paper', 'custom')
-    """
-    return "custom" if _changes(seed, parameters) else profile
-
-
-def _changes(seed: int | None, parameters: Mapping[str, Any] | None) -> list[str]:
-    """Return the options by which a run departs from its profile."""
-    named = [f"-p {name}" for name in parameters or {} if name not in provenance.NEUTRAL]
-    return named if seed is None else [*named, "--seed"]
-
-
-def prepare(
-    notebooks: Sequence[Path],
-    *,
-    profile: str,
-    jobs: int | None = None,
-    seed: int | None = None,
-    parameters: Mapping[str, Any] | None = None,
-) -> list[Run]:
-    """Read notebooks and check everything that can be checked before one runs.
-
-    Raises
-    ------
-    NotebookError
-        If a notebook cannot be run, or a parameter is unknown or of the wrong type.
-    """
-    if parameters and "out" in parameters:
-        raise NotebookError("'out' is the folder that the outputs are published from; use --out")
-    runs = []
-    for notebook in map(read_notebook, notebooks):
-        values = {**notebook.profiles.get(profile, {}), **(parameters or {})}
-        if jobs is not None:
-            values.setdefault("jobs", jobs)
-        elif "jobs" in notebook.literals:
-            values.setdefault("jobs", joblib.cpu_count())
-        if seed is not None:
-            values["seed"] = seed
-        notebook.check(values)
-        runs.append(Run(notebook, values, provenance.inputs_of(notebook, values)))
-    _check_apart([run.notebook for run in runs])
-    return runs
 
 
 def run_notebooks(
@@ -130,6 +46,7 @@ def run_notebooks(
     executed: Path | None = None,
     timeout: int = TIMEOUT,
     force: bool = False,
+    here: bool = False,
     scheduler: str = "",
     progress: bool | None = None,
     echo: Callable[[str], object] = print,
@@ -163,6 +80,8 @@ def run_notebooks(
         Seconds that one cell may take.
     force
         Whether to run what is up to date, too, and to compute every trial again.
+    here
+        Whether to run what is up to date, too, if it was made elsewhere, as in a fresh clone.
     scheduler
         Address of a Dask scheduler that trials are sent to.
     progress
@@ -187,7 +106,7 @@ def run_notebooks(
         If a cell failed, took too long or killed its kernel, or if the files in `out` are not the
         declared ones or cannot be written.
     """
-    changes = _changes(seed, parameters)
+    changes = departures(seed, parameters)
     if profile != "paper":
         changes.insert(0, f"--profile {profile}")
     if changes and out.resolve().is_relative_to((paths.PROJECT / "figures").resolve()):
@@ -195,7 +114,8 @@ def run_notebooks(
             f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
             f"for a run with {', '.join(changes)}"
         )
-    runs = prepare(notebooks, profile=profile, jobs=jobs, seed=seed, parameters=parameters)
+    asked: dict[str, Any] = {"profile": profile, "jobs": jobs, "seed": seed}
+    runs = prepare(notebooks, parameters=parameters, **asked)
     folder = executed or executed_folder(out, run_name(profile, seed=seed, parameters=parameters))
     for run in runs:
         for target in (out / name for name in run.notebook.published):
@@ -204,24 +124,15 @@ def run_notebooks(
                     target,
                     f"is a folder, but {run.notebook.name} writes a file of that name",
                 )
-    with ExitStack() as locks:
-        for needed in dict.fromkeys((out, folder)):
-            try:
-                needed.mkdir(parents=True, exist_ok=True)
-                locks.enter_context(_exclusive(needed, echo))
-            except OSError as error:
-                said = (error.strerror or str(error)).lower()
-                refuse(needed, f"cannot be used as a folder: {said}")
-        waiting = []
-        for run in runs:
-            name, state = run.notebook.name, state_of(run, out, folder)
-            if state.kind == FRESH and not force:
-                echo(f"{name}: fresh, nothing to do")
-            elif state.kind == PROSE and not force:
-                refresh_text(run, out, folder)
-                echo(f"{name}: fresh; its text is brought up to date, nothing is executed")
-            else:
-                waiting.append(run)
+    with exclusive((out, folder), echo) as waited:
+        if waited:  # for how long, and what was edited meanwhile, nobody knows
+            runs = prepare(notebooks, parameters=parameters, **asked)
+        known = {run.notebook.name for run in runs} if not here else read_runs(folder).keys()
+        waiting = [
+            run
+            for run in runs
+            if force or run.notebook.name not in known or not _is_fresh(run, out, folder, echo)
+        ]
         if not waiting:
             return []
         _check_plans(waiting)
@@ -243,6 +154,17 @@ def _check_plans(runs: Sequence[Run]) -> None:
         check_declared()
 
 
+def _is_fresh(run: Run, out: Path, folder: Path, echo: Callable[[str], object]) -> bool:
+    """Return whether a notebook need not be executed; bring its text up to date then."""
+    state = state_of(run, out, folder)
+    if state.kind == FRESH:
+        echo(f"{run.notebook.name}: fresh, nothing to do")
+    elif state.kind == PROSE:
+        refresh_text(run.notebook, out, folder)
+        echo(f"{run.notebook.name}: fresh; its text is brought up to date, nothing is executed")
+    return state.kind in (FRESH, PROSE)
+
+
 def _run_all(
     runs: Sequence[Run],
     out: Path,
@@ -257,27 +179,30 @@ def _run_all(
     from replication.execution import execute  # loads papermill, which takes a second
     from replication.progress import Display
 
-    commit, clean = _commit()
-    machine = f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores"
-    where: dict[str, Any] = {"commit": commit, "clean": clean, "machine": machine}
+    for run in runs:
+        run.notebook.load()  # refuses one that is not valid before the first one runs
+    _check_scheduler(options["scheduler"])
+    where = _where()
     published: list[Path] = []
     with (
         Display(len(runs), bars=bars) as display,
-        tempfile.TemporaryDirectory(prefix="replicate-") as scratch,
+        # A kernel that is being killed may still write there.
+        tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch,
     ):
         for run in runs:
             notebook, values = run.notebook, dict(run.values)
             shown = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
             echo(f"{notebook.name}: running, {shown}" if shown else f"{notebook.name}: running")
             if "store" in notebook.literals:
-                store = _store(values.get("store", notebook.literals["store"]), out)
+                store = store_file(values.get("store", notebook.literals["store"]), out)
                 values["store"] = str(Path(scratch) / "trials.sqlite" if force else store)
             display.begin(notebook.name)
-            _remember(folder, notebook.name, None)
-            began = time.monotonic()
+            remember(folder, notebook.name, None)
+            began, inputs = time.monotonic(), run.again().inputs
             stage = Path(scratch) / notebook.name
             stage.mkdir()
             stamps = _copy_merged(notebook, out, stage)
+            shared = {name: provenance.file_hash(stage / name) for name in stamps}
             execute(
                 notebook,
                 values,
@@ -288,85 +213,59 @@ def _run_all(
                 **options,
             )
             _check_outputs(notebook, stage, stamps)
+            _check_inputs(notebook, provenance.changes(inputs, run.again().inputs))
+            compared = _compared(notebook, stage, out)
             published += _publish(notebook, stage, out, folder)
-            provenance.record(out, notebook, run.inputs)
+            provenance.record(out, notebook, inputs, shared)
             shutil.rmtree(stage)
             seconds = time.monotonic() - began
             circumstances = {"seconds": round(seconds, 1), "finished": _now()}
-            _remember(folder, notebook.name, where | circumstances)
+            remember(folder, notebook.name, where | circumstances)
             display.end()
-            echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s")
+            echo(f"{notebook.name}: {_number(notebook)} in {seconds:.1f} s{compared}")
     return list(dict.fromkeys(published))
 
 
-def executed_folder(out: Path, name: str) -> Path:
-    """Return where executed notebooks go: below `build`, or beside outputs outside the project."""
-    if out.resolve().is_relative_to(paths.PROJECT):
-        return paths.PROJECT / "build" / "executed" / name
-    return out / "executed"
+def _check_scheduler(address: str) -> None:
+    """Refuse the address of a Dask scheduler at which nothing answers."""
+    from replication.trials import SCHEDULER
 
-
-def _store(store: str, out: Path) -> Path:
-    """Return the store's file: in `out` where the project cannot be written."""
-    path = paths.resolve(store)
-    folder = path.parent
-    while not folder.exists():
-        folder = folder.parent
-    return path if os.access(folder, os.W_OK) else out.resolve() / path.name
-
-
-# --- what is up to date ----------------------------------------------------------------------
-
-
-def state_of(run: Run, out: Path, folder: Path) -> State:
-    """Return whether a notebook's outputs in `out`, executed in `folder`, are up to date."""
-    name = run.notebook.name
-    entry = provenance.read_manifest(out).get(name)
-    if entry is None:
-        own = set(run.notebook.outputs) - set(run.notebook.merged)
-        some = any((out / output).exists() for output in own)
-        unknown = ("there is no record of how they were made",)
-        return State(STALE, unknown) if some else State(MISSING)
-    lost = provenance.damaged(out, entry)
-    if len(lost) == len(entry["outputs"]) and set(lost.values()) == {"missing"}:
-        return State(MISSING)
-    why = provenance.changes(entry["inputs"], run.inputs)
-    why += [f"{output} is {how}" for output, how in lost.items()]
-    if run.notebook.executed not in entry["outputs"]:
-        why.append("its executed notebook was not published")
-    if why:
-        return State(STALE, tuple(why))
-    if (folder / run.notebook.executed).exists() and name not in read_runs(folder):
-        return State(STALE, ("its last run did not finish",))
-    return State(FRESH if shows(out / run.notebook.executed, run.notebook) else PROSE)
-
-
-def read_runs(folder: Path) -> dict[str, Any]:
-    """Return what is remembered of the last run of each notebook, by name."""
+    address = address or os.environ.get(SCHEDULER, "")
+    if not address:
+        return
     try:
-        return dict(json.loads((folder / RUNS).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return {}
+        url = urlsplit(address)
+        if url.hostname is None or url.port is None:
+            raise ValueError("it is not of the form tcp://HOST:PORT")
+        socket.create_connection((url.hostname, url.port), timeout=5).close()
+    except (OSError, ValueError) as error:
+        raise NotebookError(
+            f"no Dask scheduler answers at {address}: {first_line(error)}"
+        ) from None
 
 
-def _remember(folder: Path, name: str, entry: Mapping[str, Any] | None) -> None:
-    """Write down a notebook's last run, or that there is none."""
-    runs = {key: value for key, value in read_runs(folder).items() if key != name}
-    if entry is not None:
-        runs[name] = entry
-    write_file(folder / RUNS, json.dumps(runs, indent=1, sort_keys=True) + "\n")
+def _where() -> dict[str, Any]:
+    """Return what a run runs on: the commit, whether nothing was changed since, the machine."""
+    commit, clean = _commit()
+    machine = f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores"
+    return {"commit": commit, "clean": clean, "machine": machine}
 
 
 def _now() -> str:
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def refresh_text(run: Run, out: Path, folder: Path) -> None:
-    """Bring the text of the executed notebook up to date, the published one and the full one."""
-    name = run.notebook.executed
-    for executed in (path for path in (folder / name, out / name) if path.exists()):
-        render(run.notebook, executed)
-    provenance.rehash(out, run.notebook.name, name)
+def refresh_text(notebook: Notebook, out: Path, folder: Path) -> None:
+    """Bring the text of the executed notebook up to date, the full one and the published one."""
+    from replication.executed import rendered
+
+    full, published = folder / notebook.executed, out / notebook.executed
+    if full.exists():
+        write_file(full, rendered(notebook, full))
+    text = rendered(notebook, published)
+    # The manifest goes first: if this is killed before the file, the next run finds out.
+    provenance.rehash(out, notebook.name, notebook.executed, text)
+    write_file(published, text)
 
 
 def _commit() -> tuple[str, bool]:
@@ -387,18 +286,6 @@ def _commit() -> tuple[str, bool]:
     return said[0], not said[1]
 
 
-@contextmanager
-def _exclusive(folder: Path, echo: Callable[[str], object]) -> Iterator[None]:
-    """Keep other runs out of a folder; wait for one that is there."""
-    with (folder / LOCK).open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            echo(f"another run writes to {folder}: waiting until it ends")
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
 # --- what a run leaves -----------------------------------------------------------------------
 
 
@@ -409,22 +296,13 @@ def _number(notebook: Notebook) -> str:
     return " and rows of ".join((number, *notebook.merged))
 
 
-def _check_apart(notebooks: Sequence[Notebook]) -> None:
-    """Refuse notebooks that would overwrite each other's files."""
-    owners: dict[str, Notebook] = {}
-    for notebook in notebooks:
-        own = set(notebook.published) - set(notebook.merged)
-        for name in sorted(own):
-            if name in owners:
-                refuse(notebook.path, f"would overwrite {name} of {owners[name].path}")
-            owners[name] = notebook
-    for notebook in notebooks:
-        for name in notebook.merged:
-            if name in owners:
-                refuse(
-                    notebook.path,
-                    f"merges {name}, which {owners[name].path} overwrites",
-                )
+def _compared(notebook: Notebook, stage: Path, out: Path) -> str:
+    """Say whether outputs that were there before have the same bytes now."""
+    there = [name for name in notebook.outputs if (out / name).is_file()]
+    if not there:
+        return ""
+    other = [name for name in there if (out / name).read_bytes() != (stage / name).read_bytes()]
+    return f"; {len(other)} of them differ from before" if other else "; all bytes as before"
 
 
 def _copy_merged(notebook: Notebook, out: Path, stage: Path) -> dict[str, int]:
@@ -451,21 +329,27 @@ def _check_outputs(notebook: Notebook, stage: Path, stamps: Mapping[str, int]) -
         raise RunError(f"{notebook.path}: written but not declared: {', '.join(extra)}")
 
 
+def _check_inputs(notebook: Notebook, changed: Sequence[str]) -> None:
+    """Refuse to publish what nobody knows whether it was made before or after a change."""
+    if changed:
+        said = ", ".join(f"{one} during the run" for one in changed)
+        raise RunError(f"{notebook.path}: {said}: nothing is published; run it again")
+
+
 def _publish(notebook: Notebook, stage: Path, out: Path, folder: Path) -> list[Path]:
     """Move all outputs to `out`: copies first, which may fail, then only renaming.
 
     The executed notebook in `folder` is among them, with links to the other ones.
     """
-    drafts = {out / name: out / f".{name}.{os.getpid()}" for name in notebook.published}
+    from replication.executed import linked
+
     try:
         write_file(stage / notebook.executed, linked(folder / notebook.executed, stage))
-        for target, draft in drafts.items():
-            shutil.copyfile(stage / target.name, draft)
-        for target, draft in drafts.items():
-            draft.replace(target)
+        with tempfile.TemporaryDirectory(prefix=DRAFT, dir=out) as drafts:
+            for name in notebook.published:
+                shutil.copyfile(stage / name, Path(drafts) / name)
+            for name in notebook.published:
+                (Path(drafts) / name).replace(out / name)
     except OSError as error:
         raise RunError(f"{notebook.path}: cannot publish to {out}: {error}") from error
-    finally:
-        for draft in drafts.values():
-            draft.unlink(missing_ok=True)
-    return list(drafts)
+    return [out / name for name in notebook.published]

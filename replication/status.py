@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import datetime
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from replication import provenance
-from replication.regenerate import FRESH, MISSING, PROSE, Run, read_runs, state_of
+from replication.cleaning import gone
+from replication.freshness import FRESH, MISSING, PROSE, read_runs, state_of
+from replication.runs import Run
 
 
-def status_lines(runs: Sequence[Run], out: Path, folder: Path) -> list[str]:
+def status_lines(
+    runs: Sequence[Run], out: Path, folder: Path, options: Sequence[str] = ()
+) -> list[str]:
     """Return the state of every figure and table, notebook by notebook, a line each.
 
     Parameters
@@ -19,6 +24,8 @@ def status_lines(runs: Sequence[Run], out: Path, folder: Path) -> list[str]:
         The notebooks with their parameters and inputs of now.
     out, folder
         The outputs, and the executed notebooks.
+    options
+        The options that choose these outputs, for the commands that are recommended.
     """
     remembered, manifest = read_runs(folder), provenance.read_manifest(out)
     lines, due = [], []
@@ -41,19 +48,20 @@ def status_lines(runs: Sequence[Run], out: Path, folder: Path) -> list[str]:
                 states = MISSING
             suffixes = " ".join(name.removeprefix(stem) for name in names)
             lines.append(f"    {states:<9}{stem} {suffixes}")
+    left = gone(runs, out)
+    lines += [f"{name}: its notebook is gone" for name in left]
     lines.append("")
     if due:
-        lines.append(f"to bring {out.name} up to date: replicate run {' '.join(due)}")
+        lines.append(f"to bring {out.name} up to date: {_command('run', *due, *options)}")
     else:
-        lines.append("everything is fresh; replicate verify proves it")
+        lines.append(f"everything is fresh; {_command('verify', *options)} proves it")
+    if left:
+        lines.append(f"to remove what is left of {', '.join(left)}: {_command('clean', *options)}")
     return lines
 
 
-def undeclared(runs: Sequence[Run], out: Path) -> list[Path]:
-    """Return the files in a folder of outputs that no notebook declares."""
-    declared = {provenance.MANIFEST, ".lock"}
-    declared |= {name for run in runs for name in run.notebook.published}
-    return sorted(path for path in out.iterdir() if path.is_file() and path.name not in declared)
+def _command(*words: str) -> str:
+    return shlex.join(("replicate", *words))
 
 
 def _reasons(why: Sequence[str]) -> list[str]:

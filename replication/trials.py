@@ -7,11 +7,13 @@ trials that it is computed together with, or on whether it was computed now or r
 
 from __future__ import annotations
 
+import hashlib
 import os
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import joblib
 import numpy as np
@@ -25,7 +27,15 @@ from replication.setting import Setting
 from replication.store import DamagedTrialError, Store
 from replication.tasks import Task
 
-__all__ = ["TRACED_TRIAL", "Results", "WorkerError", "run_trials", "trial_key"]
+__all__ = [
+    "TRACED_TRIAL",
+    "Results",
+    "WorkerError",
+    "digest",
+    "run_trials",
+    "trial_key",
+    "workers",
+]
 
 SCHEDULER = "REPLICATION_SCHEDULER"
 """Environment variable with the address of a Dask scheduler that trials are sent to."""
@@ -93,9 +103,22 @@ class Results:
                         "converged": trial.converged,
                         "steps": trial.steps,
                         "choices": setting.choices,
+                        "digest": digest(trial),
                     }
                 )
         return pd.DataFrame(rows)
+
+
+def digest(trial: Trial) -> str:
+    """Return a hash of every bit of a trial but its snapshots, which only the traced trial has."""
+    parts: list[NDArray[Any]] = [trial.errors, trial.weights, trial.q, trial.values]
+    parts += [part for episode in trial.episodes for part in episode]
+    head = [bool(trial.converged), int(trial.steps), *(part.shape for part in parts)]
+    found = hashlib.sha256(repr(head).encode())
+    for part in parts:
+        found.update(part.tobytes())
+    # The prefix keeps readers of CSV from taking digits for a number.
+    return f"sha256:{found.hexdigest()[:16]}"
 
 
 def run_trials(
@@ -149,7 +172,7 @@ def run_trials(
         trial_key(setting, seed, k, traced=traced) for _, wanted in chunks for setting, k in wanted
     }
     if expected:
-        with _workers(jobs) as n, trial_meter(len(expected), progress) as report:
+        with workers(jobs) as n, trial_meter(len(expected), progress) as report:
             work = joblib.Parallel(n_jobs=n, return_as="generator_unordered")(
                 joblib.delayed(compute)(task, wanted, seed, traced=traced)
                 for task, wanted in chunks
@@ -158,7 +181,8 @@ def run_trials(
                 if not expected.issuperset(key for key, _ in finished):
                     raise WorkerError(
                         "a worker runs other code, or other versions of numpy or numba, than this "
-                        "process: install the same commit and environment.lock there"
+                        "process: install the same commit and environment.lock there, and restart "
+                        "the workers"
                     )
                 store.put(finished)
                 report(len(finished), sum(trial.steps for _, trial in finished))
@@ -166,8 +190,14 @@ def run_trials(
 
 
 @contextmanager
-def _workers(jobs: int) -> Iterator[int]:
-    """Let joblib use the Dask scheduler that the environment names; yield the number of jobs."""
+def workers(jobs: int) -> Iterator[int]:
+    """Let joblib use processes that end with this one, or the Dask scheduler of the environment.
+
+    Yields
+    ------
+    int
+        The number of jobs for joblib.
+    """
     address = os.environ.get(SCHEDULER)
     if not address:
         config = {"backend": "loky", "initializer": _end_with, "initargs": (os.getpid(),)}

@@ -8,24 +8,31 @@ from importlib import metadata
 from pathlib import Path
 
 import joblib
-import numpy as np
 import pandas as pd
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from replication import provenance
+from replication import cleaning, provenance
 from replication.choices import Value, register
 from replication.comparisons import EXPERIMENTS
 from replication.compute import compute, trial_key
 from replication.demos import load_demos
-from replication.irl import Trial
+from replication.notebooks import first_line
 from replication.params import Params
 from replication.paths import PROJECT, resolve
+from replication.runs import Run
 from replication.setting import Setting
 from replication.store import DamagedTrialError, Store
+from replication.trials import digest, workers
 
 EVERY = 20
 """One trial in so many is recomputed: 5 %."""
+
+COLUMNS = (
+    *("task", "method", "trial", "seed"),
+    *("iterations", "converged", "steps", "choices", "digest"),
+)
+"""What a row of trials.csv says."""
 
 
 def verify_outputs(out: Path) -> Iterator[str]:
@@ -36,6 +43,18 @@ def verify_outputs(out: Path) -> Iterator[str]:
     for name, entry in manifest.items():
         for output, how in provenance.damaged(out, entry).items():
             yield f"{output} is {how} since {name} made it"
+
+
+def verify_inputs(runs: Sequence[Run], out: Path) -> Iterator[str]:
+    """Yield what has changed, since they were made, of what the outputs of a folder depend on."""
+    manifest = provenance.read_manifest(out)
+    for run in runs:
+        name = run.notebook.name
+        if name in manifest:
+            for change in provenance.changes(manifest[name]["inputs"], run.inputs):
+                yield f"{name} is stale: {change}"
+    for name in cleaning.gone(runs, out):
+        yield f"{name} made outputs, and is no notebook of this project any more"
 
 
 def verify_packages(lock: Path) -> Iterator[str]:
@@ -65,8 +84,8 @@ def verify_trials(
 ) -> Iterator[str]:
     """Recompute every 20th trial of trials.csv from nothing, and yield what differs.
 
-    A trial's number of iterations and of learning steps is held against the file, and every bit of
-    it against the store where that has it.
+    Every bit of a trial counts: it is held against the digest in the file, and against the trial in
+    the store where that has it.
 
     Parameters
     ----------
@@ -79,7 +98,11 @@ def verify_trials(
     report
         Told how many trials are recomputed.
     """
-    sample = sampled_trials(out)
+    try:
+        sample = sampled_trials(out)
+    except (OSError, ValueError, KeyError) as error:
+        yield f"trials.csv cannot be read: {first_line(error)}"
+        return
     report(len(sample))
     stored = Store(store) if store.exists() else None
     rows = []
@@ -88,30 +111,47 @@ def verify_trials(
             rows.append((setting_of(row.task, row.method, row.choices), row))
         except (ValueError, KeyError, IndexError) as error:
             yield f"trials.csv: {row.task}, {row.method}, {row.choices}: no such setting: {error}"
-    work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
-        joblib.delayed(compute)(setting.task, [(setting, row.trial)], row.seed)
-        for setting, row in rows
-    )
-    for (setting, row), ((key, trial),) in zip(rows, work, strict=True):
-        name = f"{row.task}, {row.method}, {row.choices or 'defaults'}, trial {row.trial}"
-        ours = (trial.iterations, trial.converged, trial.steps)
-        if ours != (row.iterations, row.converged, row.steps):
-            yield f"trials.csv: {name}: {ours[0]} iterations and {ours[2]} steps, not those there"
-        assert key == trial_key(setting, row.seed, row.trial), "a trial has one key"
-        if stored is None or key not in stored:
-            continue
-        try:
-            same = same_bits(trial, stored.get(key))
-        except DamagedTrialError:
-            same = False
-        if not same:
-            yield f"{store.name}: {name}: the stored trial has other bits"
+    with workers(jobs) as n:
+        work = joblib.Parallel(n_jobs=n, return_as="generator")(
+            joblib.delayed(compute)(setting.task, [(setting, row.trial)], row.seed)
+            for setting, row in rows
+        )
+        for (setting, row), ((key, trial),) in zip(rows, work, strict=True):
+            name = f"{row.task}, {row.method}, {row.choices or 'defaults'}, trial {row.trial}"
+            ours = (trial.iterations, trial.converged, trial.steps)
+            if ours != (row.iterations, row.converged, row.steps):
+                yield (
+                    f"trials.csv: {name}: {ours[0]} iterations and {ours[2]} steps, not those there"
+                )
+            elif digest(trial) != row.digest:
+                yield f"trials.csv: {name}: other bits than those there"
+            assert key == trial_key(setting, row.seed, row.trial), "a trial has one key"
+            if stored is not None and not _agrees(stored, key, digest(trial)):
+                yield f"{store.name}: {name}: the stored trial has other bits"
+
+
+def _agrees(stored: Store, key: str, due: str) -> bool:
+    """Return whether a store has nothing under a key, or a trial with the digest that is due."""
+    try:
+        return key not in stored or digest(stored.get(key)) == due
+    except DamagedTrialError:
+        return False
 
 
 def sampled_trials(out: Path) -> pd.DataFrame:
-    """Return every 20th row of trials.csv that belongs to one of the paper's experiments."""
-    trials = pd.read_csv(out / "trials.csv", keep_default_na=False)
-    return trials[trials["task"].isin(list(EXPERIMENTS))].iloc[::EVERY]
+    """Return every 20th row of trials.csv that belongs to one of the paper's experiments.
+
+    Raises
+    ------
+    OSError, ValueError, KeyError
+        If the file cannot be read, or does not hold numbered trials.
+    """
+    trials = pd.read_csv(out / "trials.csv", keep_default_na=False)[list(COLUMNS)]
+    sample = trials[trials["task"].isin(list(EXPERIMENTS))].iloc[::EVERY]
+    sample = sample.astype({"trial": int, "seed": int})
+    if not (sample["trial"].between(0, len(trials) - 1) & (sample["seed"] >= 0)).all():
+        raise ValueError("it has a trial or a seed of an impossible number")
+    return sample
 
 
 def setting_of(task: str, method: str, choices: str) -> Setting:
@@ -124,23 +164,12 @@ def setting_of(task: str, method: str, choices: str) -> Setting:
     return Setting(load_demos(resolve(EXPERIMENTS[task].demos)), method, Params.of(**values))
 
 
-def same_bits(one: Trial, other: Trial) -> bool:
-    """Return whether two trials are equal to the last bit, but for their snapshots."""
-    arrays = ("errors", "weights", "q", "values")
-    pairs = [(getattr(one, name), getattr(other, name)) for name in arrays]
-    if len(one.episodes) != len(other.episodes):
-        return False
-    for mine, others in zip(one.episodes, other.episodes, strict=True):
-        pairs += zip(mine, others, strict=True)
-    return (one.converged, one.steps) == (other.converged, other.steps) and all(
-        np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in pairs
-    )
-
-
-def verify(out: Path, store: Path, *, jobs: int, echo: Callable[[str], object]) -> Sequence[str]:
+def verify(
+    runs: Sequence[Run], out: Path, store: Path, *, jobs: int, echo: Callable[[str], object]
+) -> Sequence[str]:
     """Check everything; say what is being done, and return what is wrong."""
-    echo(f"hashing the outputs in {out.name}")
-    wrong = list(verify_outputs(out))
+    echo(f"hashing the outputs in {out.name} and what they depend on")
+    wrong = [*verify_outputs(out), *verify_inputs(runs, out)]
     echo("comparing the installed packages with environment.lock")
     wrong += verify_packages(PROJECT / "environment.lock")
     if (out / "trials.csv").exists():

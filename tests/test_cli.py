@@ -1,12 +1,15 @@
 """The command line: what it prints, where it writes and how it ends."""
 
+import atexit
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -86,7 +89,7 @@ def test_run_writes_shows_and_tells(project: Path) -> None:
     table = "| -4 | 'x=y' | 9 | 2 |"
     assert (project / "build" / "custom" / "seen.md").read_text() == table
     assert table in result.stdout
-    assert f"outputs (1 new): {project / 'build' / 'custom'}\n" in result.stdout
+    assert f"outputs (2 new): {project / 'build' / 'custom'}\n" in result.stdout
     assert str(project / "build" / "executed" / "custom") in result.stdout
     assert not (project / "figures").exists()
 
@@ -127,7 +130,7 @@ def test_tables_are_shown_by_their_names(project: Path) -> None:
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
     assert titles == [(name, name) for name in ("a.md", "a_sets.md", "b.md", "b_sets.md")]
-    assert "\noutputs (5 new): " in shown
+    assert "\noutputs (7 new): " in shown
     assert "claims" not in shown
 
 
@@ -171,7 +174,7 @@ def test_failing_cell_shows_its_traceback(project: Path) -> None:
     assert "\x1b" not in result.stderr
     last = result.stderr.splitlines()[-1]
     assert re.fullmatch(r"error: .*toy\.ipynb: cell 2 failed: ValueError: no trials", last)
-    assert [path.name for path in (project / "here").iterdir()] == [".lock"]
+    assert [path.name for path in (project / "here").glob("*.*")] == [".lock"]
 
 
 def test_run_refuses_in_one_line(project: Path) -> None:
@@ -267,13 +270,31 @@ def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
         os.kill(int(pid.read_text()), 0)
 
 
+def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second Ctrl-C does not disturb the cleaning up, and one that comes later is heard."""
+    handlers: dict[int, Callable[[], object]] = {}
+    clock = [100.0]
+    monkeypatch.setattr(signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(atexit, "register", lambda *_: None)
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    cli._catch_signals()
+    interrupt = handlers[signal.SIGTERM]
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    clock[0] += cli.CLEANING / 2
+    interrupt()
+    clock[0] += cli.CLEANING
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+
+
 def test_what_is_fresh_is_not_run(project: Path) -> None:
-    """A second run says in under 3 s that there is nothing to do, without loading papermill."""
+    """A second run says that there is nothing to do, and loads nothing that takes long."""
     assert replicate("run").exit_code == 0
     code = (
         "import sys; from pathlib import Path; from replication import cli, paths\n"
         f"paths.PROJECT = Path({str(project)!r}); cli.app(['run'], standalone_mode=False)\n"
-        "print(sorted({'papermill', 'nbclient', 'matplotlib'} & set(sys.modules)))"
+        "print(sorted({'papermill', 'nbformat', 'jsonschema', 'matplotlib'} & set(sys.modules)))"
     )
     began = time.monotonic()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -303,6 +324,18 @@ def test_status_leads_from_missing_to_fresh(project: Path) -> None:
     assert "because seen.md is changed" in shown
 
 
+@pytest.mark.parametrize("words", [["--profile", "quick"], ["--out", "my figures"]])
+def test_the_recommended_command_works(
+    project: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    """What status recommends, typed as it stands, makes just what it was asked about fresh."""
+    monkeypatch.chdir(project)
+    command = replicate("status", *words).stdout.splitlines()[-1].partition(": ")[2]
+    assert replicate(*shlex.split(command)[1:]).exit_code == 0
+    last = replicate("status", *words).stdout.splitlines()[-1]
+    assert last == f"everything is fresh; {shlex.join(['replicate', 'verify', *words])} proves it"
+
+
 def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything that is wrong has a line on stderr, and any of it makes the code 1."""
     monkeypatch.setattr("replication.verification.PROJECT", project)
@@ -317,22 +350,25 @@ def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.Monk
     (project / "environment.lock").write_text("numpy==0.1\n")
     result = replicate("verify")
     assert result.exit_code == 1
-    assert result.stderr.startswith("error: seen.md is changed since toy made it\nerror: numpy ")
-    assert result.stdout.endswith("2 things do not agree\n")
+    first, second, third = result.stderr.splitlines()
+    assert first == "error: seen.md is changed since toy made it"
+    assert second == "error: toy is stale: environment.lock has changed"
+    assert third.startswith("error: numpy ")
+    assert result.stdout.endswith("3 things do not agree\n")
 
 
 def test_clean_removes_what_no_notebook_declares(project: Path) -> None:
-    """Declared files, the manifest and folders stay; --dry-run removes nothing."""
+    """The command does what it says, and says only what it would do if it is asked to."""
     assert replicate("run").exit_code == 0
     (project / "figures" / "old.png").touch()
-    (project / "figures" / "folder").mkdir()
     before = sorted((project / "figures").iterdir())
     shown = replicate("clean", "--dry-run").stdout
-    assert shown == f"would remove {project / 'figures' / 'old.png'}\n"
+    assert shown == "would remove old.png\n"
     assert sorted((project / "figures").iterdir()) == before
-    assert replicate("clean").stdout.startswith("removed ")
+    assert replicate("clean").stdout == "removed old.png\n"
     assert sorted((project / "figures").iterdir()) == [p for p in before if p.name != "old.png"]
     assert replicate("clean").stdout == ""
+    assert "has no provenance.json" in refused("clean", "--out", project)
     assert "toy: fresh" in replicate("status").stdout
 
 

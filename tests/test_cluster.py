@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,12 +71,15 @@ def start(tmp_path: Path) -> Iterator[StartCluster]:
         )
         running.append(process)
         assert process.stdout is not None
+        limit = threading.Timer(120, process.kill)  # which ends the line
+        limit.start()
         address, *workers = process.stdout.readline().split()
+        limit.cancel()
         return Cluster(address, [int(pid) for pid in workers])
 
     yield start
     for process in running:
-        process.communicate(timeout=30)  # closes its input, at which it ends
+        process.communicate(timeout=60)  # closes its input, at which it ends
 
 
 def _run(demos: Demos, path: Path, episodes: int = 60) -> Results:
@@ -170,7 +174,7 @@ def test_a_notebook_runs_on_a_cluster(
             [sys.executable, "-c", code, "run", str(path), "--out", str(out), *words],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=300,
         )
         assert done.returncode == 0, done.stderr
         found.append((out / "curves.txt").read_text())

@@ -24,7 +24,7 @@ from replication.comparisons import (
 from replication.measures import measure_trials
 from replication.paper import SOCCER_CURVES, TABLE_1, TABLE_2
 from replication.paths import PROJECT
-from replication.regenerate import prepare
+from replication.runs import prepare
 from replication.sensitivity import effects_table
 from replication.setting import Setting
 from replication.specifications import declared, maze_settings, single_specifications

@@ -8,7 +8,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from replication.executed import linked, render, shows
+from replication.executed import linked, rendered
 from replication.notebooks import Notebook, read_notebook
 
 PICTURE, OTHER = b"\x89PNG one", b"\x89PNG two"
@@ -78,10 +78,11 @@ def test_linked_notebook_has_the_same_cells(executed: Path) -> None:
 def test_shows_tells_text_apart(executed: Path, tmp_path: Path) -> None:
     """New text, new code or a new cell is seen; what papermill has injected is not."""
     same = [new_markdown_cell("# Toy"), parameters(), new_code_cell("show()")]
-    assert shows(executed, notebook(tmp_path, *same))
+    assert notebook(tmp_path, *same).is_shown_by(executed)
     for other in ("# Game", "# Toy\n"):
-        assert not shows(executed, notebook(tmp_path, new_markdown_cell(other), *same[1:]))
-    assert not shows(executed, notebook(tmp_path, *same, new_markdown_cell("The end")))
+        assert not notebook(tmp_path, new_markdown_cell(other), *same[1:]).is_shown_by(executed)
+    more = notebook(tmp_path, *same, new_markdown_cell("The end"))
+    assert not more.is_shown_by(executed)
 
 
 def test_render_works_on_a_linked_notebook(executed: Path, tmp_path: Path) -> None:
@@ -91,8 +92,8 @@ def test_render_works_on_a_linked_notebook(executed: Path, tmp_path: Path) -> No
     source = notebook(
         tmp_path, new_markdown_cell("# Game"), parameters(), new_code_cell("show()  # all")
     )
-    assert not shows(executed, source)
-    render(source, executed)
-    assert shows(executed, source)
+    assert not source.is_shown_by(executed)
+    executed.write_text(rendered(source, executed), encoding="utf-8")
+    assert source.is_shown_by(executed)
     outputs = nbformat.read(executed, as_version=4).cells[-1].outputs
     assert outputs == nbformat.reads(links, as_version=4).cells[-1].outputs

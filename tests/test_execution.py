@@ -11,8 +11,9 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import paths
-from replication.executed import render
+from replication.executed import rendered
 from replication.execution import execute
+from replication.files import write_file
 from replication.notebooks import NotebookError, RunError, read_notebook
 from replication.progress import Display
 
@@ -211,10 +212,9 @@ def test_render_is_what_a_run_would_give(run: Run, project: Path) -> None:
     node.cells.insert(3, new_markdown_cell("Behind the parameters", id="behind"))
     node.cells.append(new_markdown_cell("The end", id="end"))
     nbformat.write(node, project / "toy.ipynb")
-    render(read_notebook(project / "toy.ipynb"), project / "executed" / "toy.ipynb")
-    rendered = (project / "executed" / "toy.ipynb").read_bytes()
-    assert "Labyrinth" in cells(rendered)[1].source
-    assert rendered == run(trials=4)
+    text = rendered(read_notebook(project / "toy.ipynb"), project / "executed" / "toy.ipynb")
+    assert "Labyrinth" in cells(text.encode())[1].source
+    assert text.encode() == run(trials=4)
 
 
 def test_render_keeps_outputs(no_kernel: bytes, project: Path) -> None:
@@ -222,14 +222,14 @@ def test_render_keeps_outputs(no_kernel: bytes, project: Path) -> None:
     executed = project / "executed" / "toy.ipynb"
     write(project, f"{CODE}# a comment", prose="Only text")
     notebook = read_notebook(project / "toy.ipynb")
-    render(notebook, executed)
+    write_file(executed, rendered(notebook, executed))
     shown = cells(executed.read_bytes())
     assert shown[0].source == "Only text"
     assert shown[-1].source.endswith("# a comment")
     assert [c.get("outputs") for c in shown] == [c.get("outputs") for c in cells(no_kernel)]
-    assert not any(cell.get("outputs") for cell in notebook.node.cells)
+    assert not any(cell.get("outputs") for cell in notebook.load().cells)
     write(project, CODE)
-    render(read_notebook(project / "toy.ipynb"), executed)
+    write_file(executed, rendered(read_notebook(project / "toy.ipynb"), executed))
     assert executed.read_bytes() == no_kernel
 
 
@@ -240,7 +240,7 @@ def test_render_follows_cells_of_text(no_kernel: bytes, project: Path, cut: list
     node.cells[:1] = [new_markdown_cell(f"{k}", id=f"text-{k}") for k in cut]
     nbformat.write(node, project / "toy.ipynb")
     executed = project / "executed" / "toy.ipynb"
-    render(read_notebook(project / "toy.ipynb"), executed)
+    write_file(executed, rendered(read_notebook(project / "toy.ipynb"), executed))
     shown = cells(executed.read_bytes())
     assert [cell.source for cell in shown if cell.cell_type == "markdown"] == [str(k) for k in cut]
     assert [cell.id for cell in shown][-3:] == ["parameters", "papermill-1", "code-0"]

@@ -143,10 +143,13 @@ def test_a_change_of_a_module_is_named(write: Write, monkeypatch: pytest.MonkeyP
 
 
 def test_code_that_python_cannot_read_has_inputs(write: Write) -> None:
-    """Line magics and faults are left to the run, which says what is wrong."""
+    """Magics and faults are left to the run, and what stands beside magics still counts."""
     first, second = (inputs_of(write(CODE, line), {}) for line in ("%time x", "%time y"))
     assert changes(known(first), second) == ["the notebook's code has changed"]
     assert list(first["source"]) == ["replication.seeds"]
+    beside = write("%%time\n%matplotlib inline\n!ls\nfrom replication.seeds import trial_seeds")
+    assert list(inputs_of(beside, {})["source"]) == ["replication.seeds"]
+    assert inputs_of(write("from replication.seeds import ("), {})["source"] == {}
 
 
 def test_cells_are_told_apart(write: Write) -> None:
@@ -155,6 +158,19 @@ def test_cells_are_told_apart(write: Write) -> None:
     assert changes(
         known(inputs_of(write(whole), {})), inputs_of(write(*whole.split("\n\n\n")), {})
     ) == ["the notebook's code has changed"]
+
+
+def test_any_file_that_a_parameter_names_counts(write: Write, project: Path) -> None:
+    """A text that is the name of a file stands for what the file says; other text is only text."""
+    parameters = PARAMETERS + f'\nmap = "map.txt"\nword = "none.txt"\nlong = "{"x" * 5000}"'
+    (project / "map.txt").write_text("..G")
+    (project / "s").write_text("a store")
+    notebook = write(parameters=parameters)
+    before = inputs_of(notebook, {})
+    assert sorted(before["data"]) == ["choices.toml", "demos.json", "map.txt"]
+    (project / "map.txt").write_text(".#G")
+    (project / "s").write_text("another store")
+    assert changes(known(before), inputs_of(notebook, {})) == ["map.txt has changed"]
 
 
 def test_missing_data_is_the_users_mistake(write: Write, project: Path) -> None:
@@ -177,7 +193,7 @@ def test_equal_runs_have_equal_manifests(write: Write, project: Path) -> None:
             (folder / f"{name}.csv").write_text(name)
             (folder / f"{name}.ipynb").write_text("executed")
             notebook = write(name=name, outputs=[f"{name}.csv"])
-            record(folder, notebook, inputs_of(notebook, {"jobs": number + 1}))
+            record(folder, notebook, inputs_of(notebook, {"jobs": number + 1}), {})
         texts.append((folder / provenance.MANIFEST).read_text())
         assert str(project) not in texts[-1]
     assert texts[0] == texts[1] == texts[2]
@@ -185,22 +201,84 @@ def test_equal_runs_have_equal_manifests(write: Write, project: Path) -> None:
     assert changes(read_manifest(folder)["two"]["inputs"], inputs_of(notebook, {})) == []
 
 
+def merge(folder: Path, notebook: Notebook) -> None:
+    """Let a notebook add its row to a merged file, write its own one, and be recorded."""
+    rows = folder / "rows.csv"
+    shared = {rows.name: provenance.file_hash(rows)} if rows.exists() else {}
+    (folder / f"{notebook.name}.csv").write_text(notebook.name)
+    with rows.open("a") as file:
+        file.write(notebook.name)
+    (folder / notebook.executed).touch()
+    record(folder, notebook, inputs_of(notebook, {}), shared)
+
+
+def lost(folder: Path) -> dict[str, dict[str, str]]:
+    """Return the outputs of each notebook that are damaged."""
+    return {name: damaged(folder, entry) for name, entry in read_manifest(folder).items()}
+
+
 def test_a_merged_file_changes_for_all_that_share_it(write: Write, project: Path) -> None:
     """After one notebook has replaced its rows, the file is not damaged for the others."""
-    notebooks = [
-        write(name=name, outputs=[f"{name}.csv"], merged=["rows.csv"]) for name in ("one", "two")
-    ]
-    for notebook in notebooks:
-        (project / f"{notebook.name}.csv").write_text(notebook.name)
-        with (project / "rows.csv").open("a") as rows:
-            rows.write(notebook.name)
-        record(project, notebook, inputs_of(notebook, {}))
-    manifest = read_manifest(project)
-    assert [damaged(project, manifest[name]) for name in ("one", "two")] == [{}, {}]
+    for name in ("one", "two", "one"):
+        merge(project, write(name=name, outputs=[f"{name}.csv"], merged=["rows.csv"]))
+    assert lost(project) == {"one": {}, "two": {}}
     (project / "rows.csv").write_text("mine")
     (project / "one.csv").unlink()
-    assert damaged(project, manifest["one"]) == {"one.csv": "missing", "rows.csv": "changed"}
-    assert damaged(project, manifest["two"]) == {"rows.csv": "changed"}
+    assert lost(project) == {
+        "one": {"one.csv": "missing", "rows.csv": "changed"},
+        "two": {"rows.csv": "changed"},
+    }
+
+
+@pytest.mark.parametrize("how", ["deleted", "edited"])
+def test_lost_rows_are_missed_until_they_are_made_again(
+    write: Write, project: Path, how: str
+) -> None:
+    """A merged file that was damaged is sound again only for a notebook that has run since."""
+    notebooks = {
+        name: write(name=name, outputs=[f"{name}.csv"], merged=["rows.csv"])
+        for name in ("one", "two", "three")
+    }
+    for notebook in notebooks.values():
+        merge(project, notebook)
+    rows = project / "rows.csv"
+    if how == "deleted":
+        rows.unlink()
+    else:
+        rows.write_text("mine")
+    changed = {"rows.csv": "changed"}
+    merge(project, notebooks["one"])
+    assert lost(project) == {"one": {}, "two": changed, "three": changed}
+    merge(project, notebooks["three"])
+    assert lost(project) == {"one": {}, "two": changed, "three": {}}
+    merge(project, notebooks["two"])
+    assert lost(project) == {"one": {}, "two": {}, "three": {}}
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "3",
+        "[]",
+        "{}",
+        '{"inputs": {}, "outputs": {}}',
+        '{"inputs": {"parameters": {}, "data": {}, "source": {}}}',
+        '{"inputs": {"parameters": {}, "data": {}, "source": []}, "outputs": {}}',
+        '{"inputs": {"parameters": {}, "data": {}, "source": {}}, "outputs": [1]}',
+    ],
+)
+def test_an_entry_that_cannot_be_used_counts_as_none(
+    write: Write, project: Path, entry: str
+) -> None:
+    """One notebook's entry that lacks a part is left out, and the others stay."""
+    (project / "a.csv").touch()
+    (project / "toy.ipynb").touch()
+    record(project, write(), inputs_of(write(), {}), {})
+    path = project / provenance.MANIFEST
+    document = json.loads(path.read_text())
+    document["notebooks"]["other"] = json.loads(entry)
+    path.write_text(json.dumps(document))
+    assert list(read_manifest(project)) == ["toy"]
 
 
 @pytest.mark.parametrize(
@@ -227,7 +305,7 @@ def test_a_manifest_that_cannot_be_read_counts_as_none(
         (project / provenance.MANIFEST).write_bytes(content)
     assert read_manifest(project) == {}
     (project / "a.csv").touch()
-    record(project, write(), inputs_of(write(), {}))
+    record(project, write(), inputs_of(write(), {}), {})
     assert list(read_manifest(project)) == ["toy"]
 
 

@@ -19,10 +19,12 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import Demos, claims, execution, paths, specifications
+from replication import Demos, claims, execution, paths, provenance, specifications
 from replication.files import write_file
+from replication.folders import executed_folder
+from replication.freshness import read_runs
 from replication.notebooks import Notebook, NotebookError, RunError
-from replication.regenerate import read_runs, run_notebooks
+from replication.regenerate import run_notebooks
 from replication.verification import verify_outputs
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
@@ -282,7 +284,7 @@ def test_merged_file_is_there_when_the_notebook_starts(
     [
         ("raise KeyError('gone')", r"toy\.ipynb: cell 5 failed: KeyError: 'gone'"),
         ("os.kill(os.getpid(), 9)", r"toy\.ipynb: cell 5: the kernel was killed.*memory"),
-        ("import time; time.sleep(60)", r"toy\.ipynb: cell 5 took more than 2 seconds.*--timeout"),
+        ("import time; time.sleep(60)", r"toy\.ipynb: cell 5 took more than 8 seconds.*--timeout"),
         ("sys.exit()", r"toy\.ipynb: cell 5 ended the notebook before its last cell"),
         ("(folder / 'c').mkdir()", r"toy\.ipynb: written but not declared: c$"),
         ("(folder / 'a.txt').unlink()", r"toy\.ipynb: declared but not written: a\.txt$"),
@@ -297,7 +299,7 @@ def test_failure_leaves_earlier_outputs(
     earlier.write_text("earlier")
     path = write("(folder / 'a.txt').write_text('new')", code, "done = 1", outputs=["a.txt"])
     with pytest.raises(RunError, match=message) as caught:
-        run(path, timeout=2)
+        run(path, timeout=8)
     assert earlier.read_text() == "earlier"
     assert files(earlier.parent) == ["a.txt"]
     assert (tmp_path / "executed" / "toy.ipynb").exists()
@@ -394,6 +396,23 @@ def test_publishing_is_all_or_nothing(
     assert files(tmp_path / "figures") == ["a"]
 
 
+def test_folders_of_outputs_do_not_share_executed_notebooks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The default folders have theirs below `build`, every other folder has its own."""
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    folders = {
+        ("figures", "paper"): "build/executed/paper",
+        ("build/quick", "quick"): "build/executed/quick",
+        ("build/custom", "custom"): "build/executed/custom",
+        ("here", "paper"): "here/executed",
+        ("build/quick", "paper"): "build/quick/executed",
+        ("../there", "paper"): "../there/executed",
+    }
+    for (out, name), folder in folders.items():
+        assert executed_folder(tmp_path / out, name) == tmp_path / folder
+
+
 # --- what is executed again ------------------------------------------------------------------
 
 
@@ -407,13 +426,14 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     ) -> None:
         begun.append(notebook.name)
         names: dict[str, Any] = {}
-        for at, cell in enumerate(notebook.node.cells):
+        node = notebook.load()
+        for at, cell in enumerate(node.cells):
             if cell.cell_type == "code":
                 cell.execution_count = len(begun)
                 exec(cell.source, names)
             if at == notebook.at:
                 names |= {**values, "out": str(stage)}
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(node)))
 
     monkeypatch.setattr(execution, "execute", execute)
     return begun
@@ -500,6 +520,32 @@ def test_results_from_elsewhere_are_fresh(
     lines: list[str] = []
     assert run(path, echo=lines.append) == []
     assert lines == ["toy: fresh, nothing to do"]
+    assert begun == ["toy"]
+
+
+def test_what_was_made_elsewhere_can_be_made_here(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """With `here` a fresh clone runs everything once, and says whether it has the same bytes."""
+    path = toy(write)
+    lines: list[str] = []
+    run(path, here=True, echo=lines.append)
+    shutil.rmtree(project / "executed")
+    run(path, here=True, echo=lines.append)
+    run(path, here=True, echo=lines.append)
+    assert begun == ["toy", "toy"]
+    assert [line.partition("s; ")[2] for line in lines] == ["", "", "", "all bytes as before", ""]
+    assert lines[-1] == "toy: fresh, nothing to do"
+
+
+def test_a_run_says_what_differs_from_before(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """How many of the outputs have other bytes than before is said, for each notebook."""
+    lines: list[str] = []
+    run(toy(write))
+    run(toy(write, "value = (folder / 'b.txt') and trials + 1"), echo=lines.append)
+    assert lines[-1].endswith("; 2 of them differ from before")
 
 
 def test_cells_that_move_across_the_parameters_cell_count(
@@ -537,6 +583,78 @@ def test_other_parameters_of_a_run_execute_again(
         run(path, out=out, **options)
         run(path, out=out, **options)
     assert begun == ["toy"] * 5
+
+
+@pytest.mark.parametrize("end", [1, 50])
+def test_an_executed_notebook_that_is_cut_off_is_made_again(
+    write: Write, run: Run, project: Path, begun: list[str], end: int
+) -> None:
+    """New text cannot be put into half a file, so the notebook is executed."""
+    run(toy(write))
+    executed = project / "executed" / "toy.ipynb"
+    executed.write_bytes(executed.read_bytes()[:-end])
+    path = toy(write)
+    node = nbformat.read(path, as_version=4)
+    node.cells[0].source = "# Another headline"
+    nbformat.write(node, path)
+    run(path)
+    assert begun == ["toy", "toy"]
+    assert "Another headline" in executed.read_text()
+
+
+def test_a_kill_while_text_is_brought_up_to_date_costs_nothing(
+    write: Write,
+    run: Run,
+    project: Path,
+    no_kernel: None,
+    begun: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whichever file was written last, the next run ends the work and executes nothing."""
+    path = toy(write)
+    run(path)
+    for allowed in range(4):
+        node = nbformat.read(path, as_version=4)
+        node.cells[0].source = f"# Headline {allowed}"
+        nbformat.write(node, path)
+        replace, left = Path.replace, [allowed]
+
+        def stop(draft: Path, target: Path, replace: Any = replace, left: list[int] = left) -> None:
+            left[0] -= 1
+            if left[0] < 0:
+                raise KeyboardInterrupt
+            replace(draft, target)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "replace", stop)
+            if allowed < 3:
+                with pytest.raises(KeyboardInterrupt):
+                    run(path)
+            else:
+                run(path)
+        run(path)
+        assert f"Headline {allowed}" in (project / "figures" / "toy.ipynb").read_text()
+        assert list(verify_outputs(project / "figures")) == []
+    assert begun == ["toy"]
+
+
+def test_a_published_notebook_that_was_edited_is_made_again(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """Other text is put right without a run; other outputs, or half a file, take a run."""
+    path = toy(write)
+    run(path)
+    published = project / "figures" / "toy.ipynb"
+    whole = published.read_bytes()
+    published.write_bytes(whole.replace(b"# Toy", b"# Mine"))
+    run(path)
+    assert (published.read_bytes(), begun) == (whole, ["toy"])
+    published.write_bytes(whole.replace(b'"execution_count": 1', b'"execution_count": 7'))
+    run(path)
+    assert begun == ["toy", "toy"]
+    published.write_bytes(b"{")
+    run(path)
+    assert begun == ["toy"] * 3
 
 
 def test_prose_is_rendered_and_not_executed(
@@ -612,6 +730,130 @@ def test_only_what_changed_runs(write: Write, run: Run, project: Path, begun: li
     assert begun == ["one", "two", "two"]
 
 
+def test_rows_that_were_lost_are_made_again(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """Who runs after a shared file was deleted does not answer for the rows of the others."""
+    append = (
+        "path = folder / 'rows.csv'\n"
+        "rows = path.read_text().split() if path.exists() else []\n"
+        "path.write_text(' '.join(sorted({*rows, name})))"
+    )
+    paths = [
+        write(append, name=name, parameters=f'out = "x"\nname = "{name}"', merged=["rows.csv"])
+        for name in ("one", "two", "three")
+    ]
+    run(*paths, jobs=None)
+    (project / "figures" / "rows.csv").unlink()
+    run(paths[0], jobs=None)
+    begun.clear()
+    run(*paths, jobs=None)
+    assert begun == ["two", "three"]
+    assert (project / "figures" / "rows.csv").read_text() == "one three two"
+    run(*paths, jobs=None)
+    assert begun == ["two", "three"]
+
+
+@pytest.mark.parametrize("file", ["data.toml", "environment.lock"])
+def test_an_edit_during_the_run_publishes_nothing(
+    write: Write, run: Run, project: Path, begun: list[str], file: str
+) -> None:
+    """Nobody knows whether outputs were made before or after an edit: they are made again."""
+    edit = f"(PROJECT / {file!r}).write_text('b = 2')\nvalue = 1"
+    path = toy(write, f"from replication.paths import PROJECT\n{edit}")
+    with pytest.raises(RunError, match=rf"{re.escape(file)} has changed during the run: nothing"):
+        run(path)
+    assert files(project / "figures") == []
+    assert [one.name for one in run(path)] == ["a.txt", "b.txt", "toy.ipynb"]
+    run(path)
+    assert begun == ["toy", "toy"]
+
+
+def test_an_edit_during_an_earlier_notebook_counts(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """What a notebook depends on is what was there when it began, not when the command did."""
+    edit = "from replication.paths import PROJECT\n(PROJECT / 'data.toml').write_text('b = 2')"
+    first = write(edit, name="first", parameters=STORED)
+    second = toy(write)
+    run(first, second)
+    run(first, second)
+    assert begun == ["first", "toy"]
+    (project / "data.toml").write_text("a = 1")
+    run(first, second)
+    assert begun == ["first", "toy", "toy"]
+
+
+def test_a_module_that_is_edited_during_the_run_is_noticed(
+    write: Write, run: Run, project: Path, begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Source is read again when a notebook ends, although it is read once for all notebooks."""
+    package = project / "package"
+    package.mkdir()
+    (package / "mine.py").write_text("a = 1")
+    monkeypatch.setattr(provenance, "__file__", str(package / "provenance.py"))
+    edit = f"Path({str(package / 'mine.py')!r}).write_text('a = 2')"
+    path = toy(write, f"{edit}\nif False: import replication.mine\nvalue = 1")
+    with pytest.raises(RunError, match=r"replication\.mine has changed during the run"):
+        run(path)
+
+
+@pytest.mark.usefixtures("no_kernel")
+def test_an_invalid_notebook_is_refused_before_any_runs(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """What only nbformat finds wrong stops the notebooks before it, too."""
+    second = write(name="second")
+    document = json.loads(second.read_text())
+    document["cells"][0]["more"] = 1
+    second.write_text(json.dumps(document))
+    with pytest.raises(NotebookError, match=r"second\.ipynb: is not a valid notebook: .*'more'"):
+        run(toy(write), second)
+    assert begun == []
+
+
+@pytest.mark.usefixtures("no_kernel")
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("tcp://127.0.0.1:9", "refused"),
+        ("here", "not of the form tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:none", "none"),
+    ],
+)
+@pytest.mark.parametrize("given", [True, False])
+def test_a_scheduler_must_answer_before_anything_runs(
+    write: Write,
+    run: Run,
+    project: Path,
+    begun: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    address: str,
+    message: str,
+    given: bool,
+) -> None:
+    """An address at which nothing answers, of the option or the environment, is refused at once."""
+    if not given:
+        monkeypatch.setenv("REPLICATION_SCHEDULER", address)
+    with pytest.raises(NotebookError, match=f"no Dask scheduler answers at {address}.*{message}"):
+        run(toy(write), scheduler=address if given else "")
+    assert begun == []
+
+
+def test_what_killed_runs_left_is_swept(
+    write: Write, run: Run, project: Path, begun: list[str]
+) -> None:
+    """Half-written files are removed by the next run, also by one with nothing to do."""
+    path = toy(write)
+    run(path)
+    for folder in ("figures", "executed"):
+        (project / folder / ".draft-killed").mkdir()
+        (project / folder / ".draft-killed" / "draft").touch()
+    run(path)
+    assert begun == ["toy"]
+    assert list(project.glob("*/.draft-*")) == []
+
+
 # --- two runs at once ------------------------------------------------------------------------
 
 
@@ -625,7 +867,8 @@ def test_a_second_run_says_that_it_waits(
         fcntl.flock(lock, fcntl.LOCK_EX)
         second = threading.Thread(target=run, args=(path,), kwargs={"echo": lines.append})
         second.start()
-        while not lines:
+        end = time.monotonic() + 60
+        while not lines and time.monotonic() < end:
             time.sleep(0.01)
         time.sleep(0.1)
         assert lines == [f"another run writes to {project / 'figures'}: waiting until it ends"]

@@ -32,7 +32,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
         for name in notebook.outputs:
             (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(notebook.load())))
 
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     monkeypatch.setattr(execution, "execute", execute)
@@ -95,7 +95,7 @@ def test_a_failed_notebook_stops_the_build(project: Path, monkeypatch: pytest.Mo
     """After a run that failed, there is no site that looks as if nothing had happened."""
 
     def fail(notebook: Notebook, *_: Any, executed: Path, **__: Any) -> None:
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(notebook.load())))
         raise RunError("it failed")
 
     monkeypatch.setattr(execution, "execute", fail)

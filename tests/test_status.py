@@ -12,8 +12,9 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from replication import execution, paths, status
 from replication.files import write_file
 from replication.notebooks import Notebook
-from replication.regenerate import prepare, run_notebooks
-from replication.status import status_lines, undeclared
+from replication.regenerate import run_notebooks
+from replication.runs import prepare
+from replication.status import status_lines
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
         for name in notebook.outputs:
             (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.node)))
+        write_file(executed, str(nbformat.writes(notebook.load())))
 
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     monkeypatch.setattr(execution, "execute", execute)
@@ -187,11 +188,48 @@ def test_age_is_never_negative(project: Path, seconds: float, age: str) -> None:
     assert lines(project)[0] == f"maze: fresh (754 s, {age})"
 
 
-def test_undeclared_files_are_found(project: Path) -> None:
-    """What no notebook declares is listed; the manifest, the lock and folders are not."""
+def test_the_commands_have_the_options_of_the_question(project: Path) -> None:
+    """What is recommended for other outputs than the default ones names these."""
+    write(project)
+    runs = prepare([project / "maze.ipynb"], profile="paper")
+    options = ["--profile", "quick", "--out", "my figures"]
+    found = status_lines(runs, project / "figures", project / "done", options)
+    command = "replicate run maze --profile quick --out 'my figures'"
+    assert found[-1] == f"to bring figures up to date: {command}"
+    run(project, "maze")
+    runs = prepare([project / "maze.ipynb"], profile="paper")
+    found = status_lines(runs, project / "figures", project / "done", options)
+    command = "replicate verify --profile quick --out 'my figures'"
+    assert found[-1] == f"everything is fresh; {command} proves it"
+
+
+def test_a_notebook_that_is_gone_is_named(project: Path) -> None:
+    """Outputs of a notebook that was removed or renamed are told, with the way to remove them."""
+    write(project)
+    write(project, "old")
+    run(project, "maze", "old")
+    assert lines(project)[-4:] == [
+        "old: its notebook is gone",
+        "",
+        "everything is fresh; replicate verify proves it",
+        "to remove what is left of old: replicate clean",
+    ]
+
+
+@pytest.mark.parametrize(
+    "entry", ["3", "{}", '{"seconds": 1}', '{"seconds": "x", "finished": "y"}', "null"]
+)
+def test_what_is_badly_remembered_is_forgotten(project: Path, entry: str) -> None:
+    """A line of run.json that lacks what is shown counts as a run that did not finish."""
     write(project)
     run(project, "maze")
-    (project / "figures" / "old.png").touch()
-    (project / "figures" / "folder").mkdir()
-    runs = prepare([project / "maze.ipynb"], profile="paper")
-    assert undeclared(runs, project / "figures") == [project / "figures" / "old.png"]
+    (project / "done" / "run.json").write_text(f'{{"maze": {entry}}}')
+    assert lines(project)[:2] == ["maze: stale", "    because its last run did not finish"]
+
+
+def test_what_this_repository_publishes_is_fresh(tmp_path: Path) -> None:
+    """In a fresh clone, in which nothing has run, every figure and table is up to date."""
+    notebooks = sorted((paths.PROJECT / "notebooks").glob("*.ipynb"))
+    runs = prepare(notebooks, profile="paper")
+    found = status_lines(runs, paths.PROJECT / "figures", tmp_path)
+    assert found[-1] == "everything is fresh; replicate verify proves it", "\n".join(found)

@@ -19,7 +19,7 @@ from replication.seeds import trial_seeds
 from replication.setting import Setting
 from replication.store import Store
 from replication.tasks import Task
-from replication.trials import TRACED_TRIAL, Results, WorkerError, run_trials, trial_key
+from replication.trials import TRACED_TRIAL, Results, WorkerError, digest, run_trials, trial_key
 
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
 
@@ -145,6 +145,7 @@ def test_frame_has_one_row_a_trial(small_demos: Demos, store_path: Path) -> None
         "converged",
         "steps",
         "choices",
+        "digest",
     ]
     assert len(frame) == 12
     assert not frame.duplicated(["method", "trial"]).any()
@@ -283,6 +284,35 @@ def test_trial_seeds_are_the_children_of_the_root() -> None:
     """The seeds are numpy's own spawned children."""
     ours = [seed.generate_state(2).tolist() for seed in trial_seeds(3, 4)]
     assert ours == [s.generate_state(2).tolist() for s in np.random.SeedSequence(3).spawn(4)]
+
+
+def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
+    """Trials that differ in any of their parts but the snapshots have other digests."""
+    trial = _run(small_demos, store_path).trial(_settings(small_demos)[1], 0)
+    states, actions, hits = trial.episodes[0]
+    turned = (type(trial.episodes[0])(states, actions, ~hits), *trial.episodes[1:])
+    others = [
+        replace(trial, errors=np.nextafter(trial.errors, 9)),
+        replace(trial, weights=-trial.weights),
+        replace(trial, q=trial.q + 1),
+        replace(trial, values=trial.values + 1),
+        replace(trial, values=trial.values.T),
+        replace(trial, converged=not trial.converged),
+        replace(trial, steps=trial.steps + 1),
+        replace(trial, episodes=trial.episodes[1:]),
+        replace(trial, episodes=turned),
+    ]
+    same = replace(trial, errors=trial.errors.copy(), snapshots=None)
+    assert digest(same) == digest(trial)
+    assert len({digest(one) for one in (trial, *others)}) == 1 + len(others)
+
+
+def test_digests_are_those_of_the_store(small_demos: Demos, store_path: Path) -> None:
+    """What was computed and what is read back have one digest, so either can be verified."""
+    setting = _settings(small_demos)[1]
+    ((key, trial),) = compute_module.compute(setting.task, [(setting, 1)], 5)
+    _run(small_demos, store_path)
+    assert digest(Store(store_path).get(key)) == digest(trial)
 
 
 def test_frame_survives_csv(small_demos: Demos, store_path: Path, tmp_path: Path) -> None:

@@ -7,34 +7,38 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import nbformat
 import numpy as np
 import pandas as pd
 import pytest
+from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Demos, provenance, save_demos, verification
 from replication.choices import register
 from replication.comparisons import EXPERIMENTS, Experiment
 from replication.compute import trial_key
 from replication.files import write_file
-from replication.irl import Trial
 from replication.params import Params
 from replication.paths import PROJECT
+from replication.runs import prepare
 from replication.setting import Setting
 from replication.store import Store
 from replication.tables import write_trials
 from replication.trials import run_trials
 from replication.verification import (
-    same_bits,
     sampled_trials,
     setting_of,
     verify,
+    verify_inputs,
     verify_outputs,
     verify_packages,
     verify_trials,
 )
 
+INPUTS: dict[str, Any] = {"parameters": {}, "data": {}, "source": {}}
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
 TRIALS = 5
+HEAD = b"task,method,trial,seed,iterations,converged,steps,choices,digest\n"
 
 
 @pytest.fixture
@@ -68,7 +72,7 @@ def test_outputs_are_held_against_the_manifest(tmp_path: Path) -> None:
     document = {
         "format": provenance.FORMAT,
         "version": provenance.VERSION,
-        "notebooks": {"toy": {"inputs": {}, "outputs": hashes}},
+        "notebooks": {"toy": {"inputs": INPUTS, "outputs": hashes}},
     }
     write_file(tmp_path / provenance.MANIFEST, json.dumps(document))
     assert list(verify_outputs(tmp_path)) == []
@@ -77,6 +81,26 @@ def test_outputs_are_held_against_the_manifest(tmp_path: Path) -> None:
     assert list(verify_outputs(tmp_path)) == [
         "a.csv is changed since toy made it",
         "b.csv is missing since toy made it",
+    ]
+
+
+def test_what_changed_since_is_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outputs that are whole, but of other inputs than those of now, are named."""
+    monkeypatch.setattr("replication.paths.PROJECT", tmp_path)
+    (tmp_path / "environment.lock").touch()
+    cells = [new_code_cell('out = "x"\ntrials = 3', metadata={"tags": ["parameters"]})]
+    node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
+    for name in ("one", "two"):
+        nbformat.write(node, tmp_path / f"{name}.ipynb")
+    runs = prepare([tmp_path / "one.ipynb", tmp_path / "two.ipynb"], profile="paper")
+    for run in runs:
+        (tmp_path / run.notebook.executed).touch()
+        provenance.record(tmp_path, run.notebook, run.inputs, {})
+    assert list(verify_inputs(runs, tmp_path)) == []
+    (tmp_path / "environment.lock").write_text("numpy==3")
+    assert list(verify_inputs([runs[0].again()], tmp_path)) == [
+        "one is stale: environment.lock has changed",
+        "two made outputs, and is no notebook of this project any more",
     ]
 
 
@@ -119,16 +143,39 @@ def test_what_was_computed_here_agrees(out: Path) -> None:
     assert not (out.parent / "s.sqlite").exists()
 
 
-@pytest.mark.parametrize("column", ["iterations", "converged", "steps", "seed", "trial"])
+@pytest.mark.parametrize("column", ["iterations", "converged", "steps", "seed", "trial", "digest"])
 def test_a_changed_row_is_found(out: Path, column: str) -> None:
     """Whatever of a sampled row is not what its trial gives, the row is named."""
     table = pd.read_csv(out / "trials.csv", keep_default_na=False)
     value = table.loc[3, column]
-    table.loc[3, column] = not value if column == "converged" else value + 1
+    special = {"converged": not value, "digest": table.loc[6, "digest"]}
+    table.loc[3, column] = special[column] if column in special else value + 1
     table.to_csv(out / "trials.csv", index=False)
     (said,) = wrong(out)
     assert said.startswith("trials.csv: small, adaboost, EPISODES=60 HORIZON=40 ITERATION-CAP=20, ")
     assert f"trial {table.loc[3, 'trial']}: " in said
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "No columns to parse"),
+        (b"\xff\xfe\x00", "codec can't decode"),
+        (b'task,"method\n', "EOF inside string"),
+        (b"task,method,trial,seed,iterations,converged,steps,choices\n", "digest"),
+        (HEAD + b"small,unified,one,4,1,True,1,,x\n", "invalid literal"),
+        (HEAD + b"small,unified,,4,1,True,1,,x\n", "invalid literal"),
+        (HEAD + b"small,unified,0,-4,1,True,1,,x\n", "impossible number"),
+        (HEAD + b"small,unified,1000000000,4,1,True,1,,x\n", "impossible number"),
+    ],
+)
+def test_a_damaged_file_is_one_line(out: Path, content: bytes, said: str) -> None:
+    """A trials.csv that holds no trials is an error that is told, not a traceback."""
+    (out / "trials.csv").write_bytes(content)
+    (line,) = wrong(out)
+    assert line.startswith("trials.csv cannot be read: ")
+    assert said in line
+    assert "\n" not in line
 
 
 @pytest.mark.parametrize("choices", ["NO-CHOICE=1", "EPISODES=many", "ALPHA", "MAP-OPEN=x"])
@@ -177,27 +224,6 @@ def test_one_trial_in_twenty_is_sampled() -> None:
     assert verification.EVERY == 20
 
 
-def test_same_bits_sees_every_part(out: Path) -> None:
-    """Trials that differ in any of their parts but the snapshots are not the same."""
-    row = next(sampled_trials(out).itertuples())
-    key = trial_key(setting_of(row.task, row.method, row.choices), row.seed, row.trial)
-    trial = Store(out.parent / "s.sqlite").get(key)
-    states, actions, hits = trial.episodes[0]
-    episodes = (type(trial.episodes[0])(states, actions, ~hits), *trial.episodes[1:])
-    others: list[Trial] = [
-        replace(trial, errors=trial.errors + 1),
-        replace(trial, weights=-trial.weights),
-        replace(trial, q=trial.q + 1),
-        replace(trial, values=trial.values + 1),
-        replace(trial, converged=not trial.converged),
-        replace(trial, steps=trial.steps + 1),
-        replace(trial, episodes=trial.episodes[1:]),
-        replace(trial, episodes=episodes),
-    ]
-    assert same_bits(trial, replace(trial, errors=trial.errors.copy(), snapshots=None))
-    assert [same_bits(trial, other) for other in others] == [False] * len(others)
-
-
 # --- the settings behind rows ----------------------------------------------------------------
 
 
@@ -243,7 +269,7 @@ def test_everything_is_checked_and_told(out: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(verification, "PROJECT", out.parent)
     (out.parent / "environment.lock").write_text("numpy==0.1\n")
     told: list[str] = []
-    found = verify(out, out.parent / "s.sqlite", jobs=1, echo=told.append)
+    found = verify([], out, out.parent / "s.sqlite", jobs=1, echo=told.append)
     assert [said.split()[0] for said in told] == ["hashing", "comparing", "recomputing"]
     assert len(found) == 2
     assert "provenance.json is missing" in found[0]

@@ -14,16 +14,10 @@ import nbformat
 
 from replication import paths, provenance
 from replication.files import write_file
-from replication.regenerate import (
-    FRESH,
-    PROSE,
-    Run,
-    executed_folder,
-    prepare,
-    read_runs,
-    refresh_text,
-    state_of,
-)
+from replication.folders import executed_folder, outputs_folder
+from replication.freshness import FRESH, PROSE, read_runs, state_of
+from replication.regenerate import refresh_text
+from replication.runs import Run, prepare
 from replication.site import overview
 from replication.site.pages import Provenance, anchor, page
 from replication.tables import read_table
@@ -63,7 +57,7 @@ def build_site(
     SiteError
         If a notebook is stale or failed, or Sphinx refuses a page.
     """
-    out = paths.PROJECT / "figures"
+    out = outputs_folder("paper")
     folder = executed_folder(out, "paper")
     runs = prepare(notebooks, profile="paper")
     _check(runs, out, folder)
@@ -80,7 +74,7 @@ def _check(runs: Sequence[Run], out: Path, folder: Path) -> None:
     for run in runs:
         state = state_of(run, out, folder)
         if state.kind == PROSE:
-            refresh_text(run, out, folder)
+            refresh_text(run.notebook, out, folder)
         elif state.kind != FRESH:
             name = run.notebook.name
             why = f": {state.why[0]}" if state.why else ""
