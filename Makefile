@@ -10,18 +10,22 @@ unexport PYTHONPATH PYTHONHOME
 # Nor may a local store of packages decide which versions and files the lock names.
 unexport UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
-.PHONY: help reproduce sensitivity quick test bench lint readme lock clean
+.PHONY: help reproduce sensitivity site quick test bench lint readme lock clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-13s%s\n", $$1, $$2 }' Makefile
 	@echo 'The first target builds $(VENV) from environment.lock; PYTHON=python3.12 names its interpreter.'
 
-reproduce: $(VENV)/.ready ## run everything in the paper and judge each claim
-	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile paper
+reproduce: $(VENV)/.ready ## run everything in the paper, judge each claim, build the site
+	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile paper --here
+	$(VENV)/bin/replicate site
 
 sensitivity: $(VENV)/.ready ## what the verdicts depend on: the claims under hundreds of other choices
-	$(VENV)/bin/replicate run calibration sensitivity --profile paper
+	$(VENV)/bin/replicate run calibration sensitivity --profile paper --here
+
+site: $(VENV)/.ready ## build the report from what is published in figures/, into build/site
+	$(VENV)/bin/replicate site
 
 quick: $(VENV)/.ready ## the paper with few trials, into build/quick
 	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile quick --out build/quick
