@@ -290,7 +290,7 @@ def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.Monke
 
 
 def test_what_is_fresh_is_not_run(project: Path) -> None:
-    """A second run says in under 3 s that there is nothing to do, and loads nothing that takes long."""
+    """A second run says in under 3 s that there is nothing to do, and loads nothing slow."""
     assert replicate("run").exit_code == 0
     code = (
         "import sys; from pathlib import Path; from replication import cli, paths\n"
