@@ -32,6 +32,7 @@ from typer.testing import CliRunner
 from replication import Demos, cli, demonstrate, execution, paths, save_demos
 from replication.envs import Maze
 from replication.files import write_file
+from replication.notebooks import Notebook
 from replication.params import Params
 from replication.setting import Setting
 from replication.store import Store
@@ -478,9 +479,9 @@ def test_every_write_may_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(paths, "PROJECT", tmp_path)
     content = {"text": "old"}
 
-    def execute(_: object, __: object, stage: Path, *, executed: Path, **___: Any) -> None:
+    def execute(notebook: Notebook, _: object, stage: Path, *, executed: Path, **__: Any) -> None:
         (stage / "a.txt").write_text(content["text"])
-        write_file(executed, content["text"])
+        write_file(executed, notebook.text)
 
     monkeypatch.setattr(execution, "execute", execute)
     (tmp_path / "environment.lock").touch()
