@@ -351,5 +351,6 @@ def _publish(notebook: Notebook, stage: Path, out: Path, folder: Path) -> list[P
             for name in notebook.published:
                 (Path(drafts) / name).replace(out / name)
     except OSError as error:
-        raise RunError(f"{notebook.path}: cannot publish to {out}: {error}") from error
+        said = error.strerror or str(error)  # which file of the stage it was helps nobody
+        raise RunError(f"{notebook.path}: cannot publish to {out}: {said}") from error
     return [out / name for name in notebook.published]
