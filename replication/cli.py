@@ -276,7 +276,7 @@ def site(
     ),
 ) -> None:
     """Build the report from the published results; nothing is executed."""
-    from replication.site import build_site
+    from replication.site.build import build_site
 
     first = build_site(_all_notebooks(), out, echo=typer.echo)
     typer.echo(f"open {first.resolve().as_uri()} in a browser")

@@ -14,7 +14,8 @@ from replication import execution, paths
 from replication.files import write_file
 from replication.notebooks import Notebook, RunError
 from replication.regenerate import run_notebooks
-from replication.site import SiteError, build, build_site
+from replication.site import build
+from replication.site.build import SiteError, build_site
 from replication.verification import verify_outputs
 
 CONF = """

@@ -4,7 +4,3 @@
 the site says of all of them together, and `extension` is what Sphinx has to know. The prose is in
 `docs/`.
 """
-
-from replication.site.build import SiteError, build_site
-
-__all__ = ["SiteError", "build_site"]

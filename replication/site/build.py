@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -9,8 +10,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-
-import nbformat
 
 from replication import paths, provenance
 from replication.files import write_file
@@ -22,7 +21,7 @@ from replication.site import overview
 from replication.site.pages import Provenance, anchor, page
 from replication.tables import read_table
 
-PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff")
+PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
 """Files of the project that pages link to."""
 
 
@@ -119,15 +118,16 @@ def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str
             done.get("machine", ""),
         )
         shown = page(out / run.notebook.executed, out, came)
-        yield f"notebooks/{name}.ipynb", nbformat.writes(shown).encode()
+        yield f"notebooks/{name}.ipynb", json.dumps(shown, indent=1).encode()
         yield f"source/{name}.ipynb", run.notebook.path.read_bytes()
     for name, text in _overview(out).items():
         yield f"_generated/{name}.md", text.encode()
 
 
 def _readme() -> str:
-    """Return the README; what it links to as a table in a file is a table on a page here."""
+    """Return the README; tables and executed notebooks in files that it links to are pages here."""
     text = (paths.PROJECT / "README.md").read_text(encoding="utf-8")
+    text = re.sub(r"(?<=\()figures/(\w+\.ipynb)(?=\))", r"notebooks/\1", text)
     return re.sub(r"(?<=\()figures/(\w+)\.md(?=\))", lambda match: f"#{anchor(match[1])}", text)
 
 
@@ -172,7 +172,7 @@ def _replace(new: Path, site: Path) -> None:
     draft, old = (site.with_name(f".{site.name}.{kind}") for kind in ("draft", "old"))
     for left in (draft, old):
         shutil.rmtree(left, ignore_errors=True)
-    shutil.copytree(new, draft, ignore=shutil.ignore_patterns(".buildinfo", ".doctrees"))
+    shutil.copytree(new, draft, ignore=shutil.ignore_patterns(".*", "*.map"))
     if site.exists():
         site.replace(old)
     draft.replace(site)

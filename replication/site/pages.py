@@ -6,15 +6,12 @@ wants to know of them: what one sees, from which run it comes, and where data an
 
 from __future__ import annotations
 
-import copy
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import nbformat
-from nbformat.v4 import new_markdown_cell
 
 from replication.choices import register
 
@@ -72,8 +69,8 @@ def _download(text: str, file: str) -> str:
     return f"{{download}}`{text} <../{file}>`"
 
 
-def page(executed: Path, files: Path, provenance: Provenance) -> Any:
-    """Return the page of an executed notebook.
+def page(executed: Path, files: Path, provenance: Provenance) -> dict[str, Any]:
+    """Return the page of an executed notebook, a notebook as JSON.
 
     Parameters
     ----------
@@ -84,26 +81,32 @@ def page(executed: Path, files: Path, provenance: Provenance) -> Any:
     provenance
         What stands under each of them.
     """
-    node = copy.deepcopy(nbformat.read(executed, as_version=4))
+    node: dict[str, Any] = json.loads(executed.read_text(encoding="utf-8"))
     tables = {path.read_text(encoding="utf-8"): path.stem for path in sorted(files.glob("*.md"))}
     cells = []
-    for cell in node.cells:
-        if cell.cell_type == "markdown":
-            cell.source = link_choices(cell.source)
-            cells.append(cell)
-            continue
-        cell.metadata.setdefault("tags", []).append("hide-input")
+    for cell in node["cells"]:
         cells.append(cell)
+        if cell["cell_type"] == "markdown":
+            cell["source"] = link_choices("".join(cell["source"]))
+            continue
+        cell["metadata"].setdefault("tags", []).append("hide-input")
         kept = []
-        for at, output in enumerate(cell.outputs):
-            text = output.get("data", {}).get("text/markdown")
-            if text is None:
+        for at, output in enumerate(cell["outputs"]):
+            text = "".join(output.get("data", {}).get("text/markdown", ""))
+            if not text:
                 kept.append(output)
                 continue
-            shown = _shown(text, tables, files, cell.source, provenance)
-            cells.append(new_markdown_cell(shown, id=f"{cell.id}-output-{at}"))
-        cell.outputs = kept
-    node.cells = cells
+            shown = _shown(text, tables, files, "".join(cell["source"]), provenance)
+            cells.append(
+                {
+                    "cell_type": "markdown",
+                    "id": f"{cell['id']}-output-{at}",
+                    "metadata": {},
+                    "source": shown,
+                }
+            )
+        cell["outputs"] = kept
+    node["cells"] = cells
     return node
 
 
@@ -168,6 +171,6 @@ def _beside(files: Path, name: str) -> list[str]:
 
 
 def _named(files: Path, name: str) -> Iterator[str]:
-    for suffix in (".csv", ".html", ".png", ".svg"):
+    for suffix in (".csv", ".svg"):  # pictures and players are on the page itself
         if (files / f"{name}{suffix}").exists():
             yield f"{name}{suffix}"
