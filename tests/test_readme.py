@@ -111,12 +111,12 @@ def test_calibration_is_said_not_to_hold_up() -> None:
 
 
 def test_trace_is_said_to_contribute_little() -> None:
-    """A trace that stays at its start is one that is 1, and neither costs five iterations."""
+    """A trace that stays at its start is one that is 1; what it costs may be nothing."""
     table = read("ablations").set_index("setting")
     label = "Unified, without incorrect, Fᵢ (printed), "
     ones, start = table.loc[f"{label}ALPHA=0.0 F-START=1.0"], table.loc[f"{label}ALPHA=0.0"]
     assert ones.tolist() == start.tolist()
-    assert ones["more_high"] < 5
+    assert ones["more_low"] < 0 < ones["more"]
 
 
 # --- the rest --------------------------------------------------------------------------------
