@@ -199,7 +199,7 @@ def describe_curve(
     part = _sorted_effects(effects, specifications, claim)
     said = (
         f"{claim.id} holds in {_holding(part)}; it is {_counted(part)}"
-        f"{_without_caps(part).replace(chr(10), '; ')}. Effects run from "
+        f"{_without_caps(part, claim).replace(chr(10), '; ')}. Effects run from "
         f"{part['effect'].min():.3g} to {part['effect'].max():.3g}"
     )
     for row in _default(effects, claim).itertuples():
@@ -250,7 +250,7 @@ def _draw_curve(panel: Axes, part: pd.DataFrame, claim: Claim) -> None:
         place, side = ((0.985, 0.04), ("right", "bottom"))
     panel.text(
         *place,
-        f"holds in {_holding(part)}\n{_counted(part)}{_without_caps(part)}",
+        f"holds in {_holding(part)}\n{_counted(part)}{_without_caps(part, claim)}",
         transform=panel.transAxes,
         ha=side[0],
         va=side[1],
@@ -543,10 +543,13 @@ def _holding(part: pd.DataFrame) -> str:
     return f"{holds} of {len(part)} specifications ({100 * holds / len(part):.0f} %)"
 
 
-def _without_caps(part: pd.DataFrame) -> str:
-    """Say in how many specifications without a trial at the cap a claim holds, if others exist."""
+def _without_caps(part: pd.DataFrame, claim: Claim) -> str:
+    """Say in how many specifications without a trial at the cap a claim holds, if others exist.
+
+    Nothing is said of shares: without such a trial they are 1.
+    """
     some = part[part["capped"] == 0]
-    if len(some) in (0, len(part)):
+    if claim.statistic == "share" or len(some) in (0, len(part)):
         return ""
     holds = int((some["outcome"] == HOLDS).sum())
     share = 100 * holds / len(some)

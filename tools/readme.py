@@ -306,10 +306,10 @@ def trace() -> str:
     default = ablation("Unified, without incorrect, Fᵢ (printed), default")
     return (
         "**The trace contributes little, if anything.** With F = 1 for ever, a plain perceptron, "
-        f"the unified method needs {_more(ones)} iterations more than with our default, over the same {ones.n} seeds ({ones.mean:.1f} against "
-        f"{default.mean:.1f}); R1 needs {_more(r1)} more. "
-        "Without marked pairs F = F₀ for ever is the same method as F = 1 for ever, since all "
-        "weights start at zero and only their ratios matter."
+        f"the unified method needs {_more(ones)} iterations more than with our default, over the "
+        f"same {ones.n} seeds ({ones.mean:.1f} against {default.mean:.1f}); R1 needs {_more(r1)} "
+        "more. Without marked pairs F = F₀ for ever is the same method as F = 1 for ever, since "
+        "all weights start at zero and only their ratios matter."
     )
 
 
