@@ -6,7 +6,10 @@ import os
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[1]
-"""The project folder, which holds `notebooks/`, `data/` and `figures/`."""
+"""The project folder, which holds `notebooks/`, `data/` and `figures/`.
+
+:meta hide-value:
+"""
 
 
 def resolve(path: str | os.PathLike[str]) -> Path:

@@ -56,6 +56,17 @@ def test_a_figure_says_what_one_sees_and_where_it_is_from(folder: Path) -> None:
     assert text.rstrip("`\n").endswith("code: {py:func}`~replication.figures.error_figure")
 
 
+def test_code_behind_a_function_of_the_notebook_is_named(folder: Path) -> None:
+    """Where a cell draws through a function of an earlier cell, that one's code counts."""
+    cells = [
+        new_code_cell("def draw():\n    return figures.error_figure(1)"),
+        new_code_cell("draw()", outputs=[shown("![falls](fig05.png)")]),
+    ]
+    nbformat.write(new_notebook(cells=cells), folder / "toy.ipynb")
+    text = page(folder / "toy.ipynb", folder, CAME)["cells"][-1]["source"]
+    assert "{py:func}`~replication.figures.error_figure`" in text
+
+
 def test_a_table_has_its_file(folder: Path) -> None:
     """A table that was published is shown as it is, with its full numbers to take away."""
     text = made(folder, shown(TABLE)).cells[2].source

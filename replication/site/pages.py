@@ -83,12 +83,16 @@ def page(executed: Path, files: Path, provenance: Provenance) -> dict[str, Any]:
     """
     node: dict[str, Any] = json.loads(executed.read_text(encoding="utf-8"))
     tables = {path.read_text(encoding="utf-8"): path.stem for path in sorted(files.glob("*.md"))}
-    cells = []
+    cells: list[dict[str, Any]] = []
+    defined: dict[str, str] = {}
     for cell in node["cells"]:
         cells.append(cell)
         if cell["cell_type"] == "markdown":
             cell["source"] = link_choices("".join(cell["source"]))
             continue
+        code = "".join(cell["source"])
+        called = [text for name, text in defined.items() if f"{name}(" in code]
+        defined |= {match[1]: code for match in re.finditer(r"^def (\w+)", code, re.MULTILINE)}
         cell["metadata"].setdefault("tags", []).append("hide-input")
         kept = []
         for at, output in enumerate(cell["outputs"]):
@@ -96,7 +100,7 @@ def page(executed: Path, files: Path, provenance: Provenance) -> dict[str, Any]:
             if not text:
                 kept.append(output)
                 continue
-            shown = _shown(text, tables, files, "".join(cell["source"]), provenance)
+            shown = _shown(text, tables, files, "".join([code, *called]), provenance)
             cells.append(
                 {
                     "cell_type": "markdown",
