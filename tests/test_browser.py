@@ -278,7 +278,7 @@ def test_every_table_can_be_taken_away(open_page: Open) -> None:
     with page.expect_download() as download:
         page.locator("a.table-csv").first.click()
     text = Path(download.value.path()).read_text(encoding="utf-8")
-    assert text.startswith('"Claim","Paper"')
+    assert text.startswith('"Claim","Verdict"')
     assert text.count("\n") == page.locator("table").first.locator("tr").count()
 
 

@@ -45,8 +45,8 @@ def test_each_verdict_is_that_of_the_file(judged: pd.DataFrame) -> None:
     assert len(table) == len(parts)
     for row, part in zip(table, parts, strict=True):
         assert row[0] == part["claim"].iloc[0]
-        said = re.match(r"\[\**([\w ]+?)\**( \(.*\)|:.*)?\]\(#result-[\w-]+\)$", row[-1])
-        assert said is not None, row[-1]
+        said = re.match(r"\[\**([\w ]+?)\**( \(.*\)|:.*)?\]\(#result-[\w-]+\)$", row[1])
+        assert said is not None, row[1]
         assert said[1] == overall(part["verdict"].tolist())
 
 
@@ -61,7 +61,7 @@ def test_plots_are_to_scale() -> None:
     """Interval, effect, margin and the paper's effect stand where their sizes say."""
     svg = plot([(-4.0, -6.0, -2.0), (-1.0, -3.0, 1.0)], paper=-5.0)
     lines = {one.get("class"): one for one in svg.iter("line")}
-    margin = float(lines["margin"].get("x1", ""))
+    margin = float(lines["edge"].get("x1", ""))
     scale = (margin - float(lines["printed"].get("x1", ""))) / 6.0
     assert scale > 0
     (circle,) = svg.iter("circle")
@@ -95,13 +95,13 @@ def test_every_choice_is_described() -> None:
     text = choices(shares)
     for one in register().values():
         assert f"[{one.id}](#choice-{one.id.lower()})" in text
-        assert f"(choice-{one.id.lower()})=\n\n## {one.id}\n" in text
+        assert f"(choice-{one.id.lower()})=\n\n### {one.id}\n" in text
         assert one.open in text
         assert one.rule in text
     alpha = next(row for row in rows(text) if row[0].startswith("[ALPHA]"))
     assert alpha[-1] == "X (50 %)"
     beta = next(row for row in rows(text) if row[0].startswith("[BETA]"))
-    assert beta[-1] == "not varied"
+    assert beta[-1] == "–"
 
 
 def test_citation_is_that_of_the_file() -> None:

@@ -48,11 +48,11 @@ def verdicts(judged: pd.DataFrame) -> str:
         rows.append(
             {
                 "Claim": row["Claim"],
+                "Verdict": f"[{row['Verdict']}](#{anchor(evidence)})",
                 "Paper": f"{row['Paper']} ({row['Place']})".removeprefix("– "),
                 "Effect, with 95 % interval": interval_plot(part),
                 "Fᵢ (printed)": row["Fᵢ (printed)"],
                 "Fᵢ₊₁ (updated)": row["Fᵢ₊₁ (updated)"],
-                "Verdict": f"[{row['Verdict']}](#{anchor(evidence)})",
             }
         )
     return markdown(pd.DataFrame(rows))
@@ -85,7 +85,7 @@ def interval_plot(part: pd.DataFrame) -> str:
     marks = [
         f'<rect class="claimed" x="{side[0]}" y="0" width="{round(side[1], 1)}" '
         f'height="{HEIGHT}"></rect>',
-        f'<line class="margin" x1="{edge}" x2="{edge}" y1="0" y2="{HEIGHT}"></line>',
+        f'<line class="edge" x1="{edge}" x2="{edge}" y1="0" y2="{HEIGHT}"></line>',
     ]
     for one in part.itertuples():
         if math.isnan(one.effect):
@@ -145,7 +145,7 @@ def choices(shares: pd.DataFrame) -> str:
         {
             "Choice": [f"[{one.id}](#choice-{one.id.lower()})" for one in entries],
             "Where": [one.place for one in entries],
-            "Default": [f"`{one.default}`" for one in entries],
+            "Default": [f"`{one.default}`" if one.field else one.default for one in entries],
             "Also accepted": [_alternatives(one) for one in entries],
             "Matters most to": [_matters(one, shares) for one in entries],
         }
@@ -158,7 +158,7 @@ def _choice(one: Choice) -> Sequence[str]:
     return (
         f"(choice-{one.id.lower()})=",
         "",
-        f"## {one.id}",
+        f"### {one.id}",
         "",
         f"*{one.place}.* {one.open}",
         "",
@@ -176,11 +176,10 @@ def _alternatives(one: Choice) -> str:
 
 
 def _matters(one: Choice, shares: pd.DataFrame) -> str:
-    own = shares[(shares["choice"] == one.id) & (shares["share"] >= 0.05)]
-    return ", ".join(
-        f"{row.claim} ({100 * row.share:.0f} %)"
-        for row in own.sort_values("share", ascending=False).itertuples()
-    ) or ("–" if (shares["choice"] == one.id).any() else "not varied")
+    varied = shares[shares["choice"] == ("MAP" if one.id.startswith("MAP-") else one.id)]
+    own = varied[varied["share"] >= 0.05].sort_values("share", ascending=False)
+    said = ", ".join(f"{row.claim} ({100 * row.share:.0f} %)" for row in own.itertuples())
+    return said or ("none" if len(varied) else "–")
 
 
 def citation(text: str) -> str:
