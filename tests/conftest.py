@@ -1,10 +1,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import nbformat
 import pytest
 
-from replication import Demos, Maze, demonstrate, load_demos
+from replication import Demos, Maze, demonstrate, execution, load_demos, paths
+from replication.files import write_file
+from replication.notebooks import Notebook
 from replication.paths import PROJECT
 
 SMALL = """
@@ -27,6 +31,21 @@ def small_demos() -> Demos:
 def stored_demos(request: pytest.FixtureRequest) -> Demos:
     """Each of the two stored mazes."""
     return load_demos(PROJECT / "data" / "demos" / f"{request.param}.json")
+
+
+@pytest.fixture
+def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Set up a project in which "executing" a notebook writes each of its outputs."""
+
+    def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
+        for name in notebook.outputs:
+            (stage / name).write_text(notebook.name)
+        write_file(executed, str(nbformat.writes(notebook.load())))
+
+    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(execution, "execute", execute)
+    (tmp_path / "environment.lock").touch()
+    return tmp_path
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import execution, paths
+from replication import execution
 from replication.files import write_file
 from replication.notebooks import Notebook, RunError
 from replication.regenerate import run_notebooks
@@ -27,25 +27,16 @@ INDEX = "# Toy report\n\n{text}\n\n```{{toctree}}\nnotebooks/toy\n```\n"
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def project(toy_project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with a notebook, its published outputs and a page of prose."""
-
-    def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
-        for name in notebook.outputs:
-            (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.load())))
-
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
-    monkeypatch.setattr(execution, "execute", execute)
     monkeypatch.setattr(papermill, "execute_notebook", lambda *_, **__: pytest.fail("executed"))
     monkeypatch.setattr(build, "_overview", lambda out: {"verdicts": "all\n"})
-    write_file(tmp_path / "docs" / "conf.py", CONF)
-    write_file(tmp_path / "docs" / "index.md", INDEX.format(text="Some prose."))
-    write_file(tmp_path / "README.md", "[table](figures/toy_table.md)")
-    (tmp_path / "environment.lock").touch()
-    write(tmp_path)
-    run(tmp_path)
-    return tmp_path
+    write_file(toy_project / "docs" / "conf.py", CONF)
+    write_file(toy_project / "docs" / "index.md", INDEX.format(text="Some prose."))
+    write_file(toy_project / "README.md", "[table](figures/toy_table.md)")
+    write(toy_project)
+    run(toy_project)
+    return toy_project
 
 
 def write(project: Path, code: str = "x = 1", prose: str = "# A toy") -> Path:

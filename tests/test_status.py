@@ -3,33 +3,21 @@ from __future__ import annotations
 import datetime
 import json
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import execution, paths, status
-from replication.files import write_file
-from replication.notebooks import Notebook
+from replication import paths, status
 from replication.regenerate import run_notebooks
 from replication.runs import prepare
 from replication.status import status_lines
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Set up a project in which "executing" a notebook writes each of its outputs."""
-
-    def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
-        for name in notebook.outputs:
-            (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.load())))
-
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
-    monkeypatch.setattr(execution, "execute", execute)
-    (tmp_path / "environment.lock").touch()
-    return tmp_path
+def project(toy_project: Path) -> Path:
+    """Use a project in which nothing is really executed."""
+    return toy_project
 
 
 def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "# Maze") -> Path:
