@@ -140,10 +140,10 @@ def test_claims_are_shown_last(
 ) -> None:
     """A run that judges the claims ends with a line for each of them, the verdict first."""
     table = (
-        "id,claim,place,F,verdict\n"
-        "A,It is faster,Table I,printed,reproduced\n"
-        "A,It is faster,Table I,updated,undecided\n"
-        "B,It is steadier,Fig. 6,,not testable\n"
+        "id,claim,place,statistic,F,paper,effect,low,high,verdict,why\n"
+        "FASTER,It is faster,Table I,mean-difference,printed,-5,-4,-6,-2,reproduced,\n"
+        "FASTER,It is faster,Table I,mean-difference,updated,-5,-1,-2,0,undecided,why\n"
+        "SD-B,SD,Fig. 6,published-sd,,3,2,1,3,not testable,used\n"
     )
     cells = [
         new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
@@ -160,11 +160,10 @@ def test_claims_are_shown_last(
     shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
     assert "long table" not in shown
     assert shown.index("executed notebooks: ") < shown.index("The paper's claims:")
-    assert shown.splitlines()[-3:] == [
-        "The paper's claims:",
-        "partly         It is faster (Table I)",
-        "not testable   It is steadier (Fig. 6)",
-    ]
+    lines = [line.split() for line in shown.splitlines()[-4:]]
+    assert " ".join(lines[0]) == "The paper's claims:"
+    assert [line[0] for line in lines[1:]] == ["verdict", "partly", "not"]
+    assert [line[-1] for line in lines[1:]] == ["claim", "AdaBoost-IRL", "SD-B"]
 
 
 def test_failing_cell_shows_its_traceback(project: Path) -> None:
