@@ -143,7 +143,7 @@ def _overview(out: Path) -> dict[str, str]:
 
 def _write(work: Path) -> None:
     """Let Sphinx write the pages that changed; a warning is an error."""
-    command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-W", "--keep-going"]
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-N", "-W", "--keep-going"]
     command += ["-c", str(paths.PROJECT / "docs"), "-d", str(work / "doctrees")]
     outline, known = _outline(work / "source"), work / "outline"
     if not known.exists() or known.read_text(encoding="utf-8") != outline:
