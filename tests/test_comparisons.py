@@ -22,6 +22,7 @@ from replication.comparisons import (
     set_settings,
 )
 from replication.measures import measure_trials
+from replication.notebooks import read_notebook
 from replication.paper import SOCCER_CURVES, TABLE_1, TABLE_2
 from replication.paths import PROJECT
 from replication.runs import prepare
