@@ -297,8 +297,12 @@ def _number(notebook: Notebook) -> str:
 
 
 def _compared(notebook: Notebook, stage: Path, out: Path) -> str:
-    """Say whether outputs that were there before have the same bytes now."""
-    there = [name for name in notebook.outputs if (out / name).is_file()]
+    """Say whether outputs that were there before have the same bytes now.
+
+    A shared file also changes with the rows of others, and is left out.
+    """
+    own = [name for name in notebook.outputs if name not in notebook.merged]
+    there = [name for name in own if (out / name).is_file()]
     if not there:
         return ""
     other = [name for name in there if (out / name).read_bytes() != (stage / name).read_bytes()]
