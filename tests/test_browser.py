@@ -262,13 +262,20 @@ def test_tables_sort(open_page: Open, by: str) -> None:
     number = head.evaluate("one => one.cellIndex")
     before = [float(one) for one in column(page, number)]
     assert before != sorted(before)
-    for order in (sorted(before, reverse=True), sorted(before)):
+    for order, direction in (
+        (sorted(before, reverse=True), "descending"),
+        (sorted(before), "ascending"),
+    ):
         if by == "mouse":
             head.click()
         else:
             head.focus()
             page.keyboard.press("Enter")
-        page.wait_for_timeout(100)
+        assert head.get_attribute("aria-sort") == direction
+        for _ in range(50):  # the rows move a moment after the click
+            if [float(one) for one in column(page, number)] == order:
+                break
+            page.wait_for_timeout(100)
         assert [float(one) for one in column(page, number)] == order
 
 

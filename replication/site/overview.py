@@ -22,6 +22,9 @@ from replication.tables import markdown, readable_verdicts
 EVIDENCE = {
     ("open-maze", "iterations"): "table1_contrasts",
     ("open-maze", "converged"): "fig05",
+    ("open-maze", "q_growth"): "fig07",
+    ("open-maze", "q_slope"): "fig07",
+    ("open-maze", "reward_slope"): "fig07",
     ("obstacle-maze", "iterations"): "table2_contrasts",
     ("obstacle-maze", "converged"): "fig09_errors",
     ("soccer", "iterations"): "soccer_contrasts",
@@ -43,8 +46,6 @@ def verdicts(judged: pd.DataFrame) -> str:
     ):
         first = part.iloc[0]
         evidence = EVIDENCE.get((first["task"], first["measure"]), "claims_trials")
-        if first["measure"].startswith(("q_", "reward_")):
-            evidence = "fig07"
         rows.append(
             {
                 "Claim": row["Claim"],
