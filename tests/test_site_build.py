@@ -145,6 +145,15 @@ def test_what_is_gone_leaves_the_site(project: Path) -> None:
     assert not (project / "site" / "extra.html").exists()
 
 
+def test_other_folders_are_left_alone(project: Path) -> None:
+    """A folder that holds something else than a site is refused, and nothing in it is touched."""
+    thesis = project / "site" / "thesis.tex"
+    write_file(thesis, "years of work")
+    with pytest.raises(SiteError, match="site holds other files than a site; choose another"):
+        built(project)
+    assert thesis.read_text() == "years of work"
+
+
 def test_a_broken_page_is_named(project: Path) -> None:
     """A link that leads nowhere is one error with the page's name, and the old site stays."""
     built(project)

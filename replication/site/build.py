@@ -13,7 +13,7 @@ from pathlib import Path
 
 from replication import paths, provenance
 from replication.files import write_file
-from replication.folders import executed_folder, outputs_folder
+from replication.folders import exclusive, executed_folder, outputs_folder
 from replication.freshness import FRESH, PROSE, read_runs, state_of
 from replication.regenerate import refresh_text
 from replication.runs import Run, prepare
@@ -23,6 +23,10 @@ from replication.tables import read_table
 
 PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
 """Files of the project that pages link to."""
+
+
+INDEX = "searchindex.js"
+"""A file that Sphinx writes into every site, and nothing else writes."""
 
 
 class SiteError(ValueError):
@@ -54,17 +58,20 @@ def build_site(
     Raises
     ------
     SiteError
-        If a notebook is stale or failed, or Sphinx refuses a page.
+        If a notebook is stale or failed, Sphinx refuses a page, or the folder holds something else.
     """
+    if site.exists() and any(site.iterdir()) and not (site / INDEX).exists():
+        raise SiteError(f"{site} holds other files than a site; choose another folder")
     out = outputs_folder("paper")
     folder = executed_folder(out, "paper")
-    runs = prepare(notebooks, profile="paper")
-    _check(runs, out, folder)
     work = paths.PROJECT / "build" / "site-work"
-    _stage(dict(_sources(runs, out, folder)), work)
-    echo(f"writing {len(runs)} notebooks and the pages of docs")
-    _write(work)
-    _replace(work / "html", site)
+    with exclusive((out, work), echo):
+        runs = prepare(notebooks, profile="paper")
+        _check(runs, out, folder)
+        _stage(dict(_sources(runs, out, folder)), work)
+        echo(f"writing {len(runs)} notebooks and the pages of docs")
+        _write(work)
+        _replace(work / "html", site)
     return site / "index.html"
 
 
@@ -89,7 +96,8 @@ def _stage(staged: Mapping[str, bytes], work: Path) -> None:
     source = work / "source"
     there = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
     if there - staged.keys():
-        shutil.rmtree(work)
+        for part in ("source", "html", "doctrees"):
+            shutil.rmtree(work / part, ignore_errors=True)
     for name, content in staged.items():
         target = source / name
         if not target.exists() or target.read_bytes() != content:
