@@ -208,6 +208,9 @@ def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
     """Return the executed notebook without what differs between equal runs."""
     node = nbformat.read(draft, as_version=4)
     node.metadata.pop("papermill", None)
+    node.metadata.get("language_info", {}).pop(
+        "version", None
+    )  # the manifest tells it, in two parts
     known = {cell.get("id") for cell in notebook.load().cells}
     added = 0
     for cell in node.cells:
