@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from replication.comparisons import EXPERIMENTS
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import SCHEDULER, run_trials
+from replication.evidence.experiments import EXPERIMENTS
+from replication.trials.condition import Condition
+from replication.trials.run import SCHEDULER, run_trials
+from replication.trials.store import Store
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -47,17 +47,17 @@ def cluster(workers: int) -> Iterator[str]:
     process.communicate(timeout=60)  # closes its input, at which it ends
 
 
-def mazes() -> list[Setting]:
-    """Return the settings of both mazes."""
+def mazes() -> list[Condition]:
+    """Return the conditions of both mazes."""
     return [
-        setting
+        condition
         for task in ("open-maze", "obstacle-maze")
-        for setting in EXPERIMENTS[task].settings().values()
+        for condition in EXPERIMENTS[task].conditions().values()
     ]
 
 
 def seconds(path: Path, trials: int, *, jobs: int = 1) -> float:
-    """Return how long trials of every setting take, from an empty store."""
+    """Return how long trials of every condition take, from an empty store."""
     began = time.perf_counter()
     run_trials(mazes(), trials=trials, store=Store(path), jobs=jobs, seed=1)
     return time.perf_counter() - began

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from replication import kernel, qlearning, reference
+from replication.learning import compiled, qlearning, reference
+from replication.learning.seeds import stream
 
 Array = NDArray[Any]
 Learner = Callable[..., tuple[Array, Array, Array]]
@@ -34,7 +35,7 @@ OPTIONS: dict[str, Any] = {
 ROUNDS = 5
 
 
-class Task(ctypes.Structure):
+class Agent(ctypes.Structure):
     """The `task` of qlearning.c."""
 
     _fields_ = (
@@ -61,7 +62,7 @@ def c_learn(tmp_path_factory: pytest.TempPathFactory) -> Learner | None:
         next_state: Array, weights: Array, q: Array, streams: Array, **options: Any
     ) -> tuple[Array, Array, Array]:
         q, streams, steps = q.copy(), streams.copy(), np.empty(len(q), np.int64)
-        task = Task(
+        task = Agent(
             states=len(next_state),
             threshold=round(options["epsilon"] * 2**32),
             random_ties=1,
@@ -103,7 +104,7 @@ def make_load(kind: str, trials: int) -> tuple[Array, Array, Array, Array]:
     chance = np.random.default_rng(2).random(trials)[:, None, None]
     weights = np.where(chance < {"loop": 1.0, "path": 0.0, "mixed": 0.5}[kind], loop, path)
     seeds = np.random.SeedSequence(3).spawn(trials)
-    streams = np.array([qlearning.stream(seed) for seed in seeds])
+    streams = np.array([stream(seed) for seed in seeds])
     return next_state, weights, np.zeros_like(weights), streams
 
 
@@ -171,11 +172,11 @@ def speeds(
 def utilisation(steps: Array) -> float:
     """Return the share of lane steps that belong to a trial, given each trial's steps."""
     left, slots = steps.copy(), 0
-    while groups := kernel.count_groups(np.count_nonzero(left)):
-        running = np.flatnonzero(left)[: groups * kernel.LANES]
+    while groups := compiled.count_groups(np.count_nonzero(left)):
+        running = np.flatnonzero(left)[: groups * compiled.LANES]
         count = left[running].min()
         left[running] -= count
-        slots += count * groups * kernel.LANES
+        slots += count * groups * compiled.LANES
     return float(steps.sum() / (slots + left.sum()))
 
 

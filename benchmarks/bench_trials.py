@@ -7,21 +7,21 @@ import time
 from pathlib import Path
 
 from replication import Params, load_demos
-from replication.paths import PROJECT
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import run_trials
+from replication.files import PROJECT
+from replication.trials.condition import Condition
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 
 def test_workers_and_memory(tmp_path: Path) -> None:
     """Print steps per second of one and two workers, and peak memory after 50 and 200 trials."""
     demos = load_demos(PROJECT / "data" / "demos" / "open_maze.json")
-    setting = Setting(demos, "unified", Params())
+    condition = Condition(demos, "unified", Params())
 
     def run(trials: int, jobs: int, name: str) -> tuple[float, float]:
         began = time.perf_counter()
         store = Store(tmp_path / name)
-        results = run_trials([setting], trials=trials, store=store, jobs=jobs, seed=1)
+        results = run_trials([condition], trials=trials, store=store, jobs=jobs, seed=1)
         seconds = time.perf_counter() - began
         steps = float(results.frame()["steps"].sum())
         peak = max(

@@ -7,12 +7,15 @@ The public interface::
     result.save("result.json")
 """
 
-from replication.demos import Demo, DemoError, Demos, check_demos, load_demos, save_demos
-from replication.envs.maze import Maze, MazeEnv, MazeError
-from replication.expert import demonstrate
+from replication.demos.checks import DemoError
+from replication.demos.files import check_demos, load_demos, save_demos
+from replication.demos.maze_expert import demonstrate
+from replication.demos.model import Demo, Demos
+from replication.envs.gym import MazeEnv
+from replication.envs.maze import Maze, MazeError
 from replication.fit import Fit, fit
 from replication.irl import METHODS
-from replication.params import Params
+from replication.paper.params import Params
 
 __version__ = "0.1.0"
 

@@ -27,7 +27,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from replication import paths
+from replication import files
 
 CLEANING = 5.0
 """Seconds after an interruption in which another one is not heard: a run is then cleaning up."""
@@ -157,10 +157,10 @@ def run(
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
     and store) to build/custom.
     """
-    from replication.folders import executed_folder, outputs_folder
-    from replication.notebooks import RunError
-    from replication.regenerate import run_notebooks
-    from replication.runs import run_name
+    from replication.pipeline.folders import executed_folder, outputs_folder
+    from replication.pipeline.notebook import RunError
+    from replication.pipeline.plan import run_name
+    from replication.pipeline.run import run_notebooks
 
     _catch_signals()
     files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
@@ -195,7 +195,7 @@ def run(
     typer.echo(f"\noutputs ({len(published)} new): {_short(target)}")
     typer.echo(f"executed notebooks: {_short(executed_folder(target, name))}")
     if any(file.stem == "claims" for file in files) and (target / "claims.csv").exists():
-        from replication.tables import read_table, verdict_lines
+        from replication.evidence.tables import read_table, verdict_lines
 
         lines = verdict_lines(read_table(target / "claims.csv"))
         typer.echo("\nThe paper's claims:\n" + "\n".join(lines))
@@ -209,9 +209,9 @@ def status(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
 ) -> None:
     """Say which figures and tables are up to date, why others are not, and what to do."""
-    from replication.folders import executed_folder, outputs_folder
-    from replication.runs import prepare
-    from replication.status import status_lines
+    from replication.pipeline.folders import executed_folder, outputs_folder
+    from replication.pipeline.plan import prepare
+    from replication.pipeline.status import status_lines
 
     target = out or outputs_folder(profile)
     runs = prepare(_all_notebooks(), profile=profile)
@@ -235,15 +235,15 @@ def verify(
     """
     import joblib
 
-    from replication import verification
-    from replication.folders import outputs_folder
-    from replication.runs import prepare
+    from replication.pipeline import verify
+    from replication.pipeline.folders import outputs_folder
+    from replication.pipeline.plan import prepare
 
     _catch_signals()
     runs, target = prepare(_all_notebooks(), profile=profile), out or outputs_folder(profile)
-    store = paths.PROJECT / "build" / "trials.sqlite"
+    store = files.PROJECT / "build" / "trials.sqlite"
     jobs = jobs or joblib.cpu_count()
-    wrong = verification.verify(runs, target, store, jobs=jobs, echo=typer.echo)
+    wrong = verify.verify(runs, target, store, jobs=jobs, echo=typer.echo)
     for one in wrong:
         typer.echo(f"error: {one}", err=True)
     typer.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
@@ -261,9 +261,9 @@ def clean(
     ] = False,
 ) -> None:
     """Remove files among the outputs that no notebook declares, and records of lost notebooks."""
-    from replication import cleaning
-    from replication.folders import outputs_folder
-    from replication.runs import prepare
+    from replication.pipeline import cleaning
+    from replication.pipeline.folders import outputs_folder
+    from replication.pipeline.plan import prepare
 
     runs = prepare(_all_notebooks(), profile=profile)
     cleaning.clean(runs, out or outputs_folder(profile), dry_run=dry_run, echo=typer.echo)
@@ -305,11 +305,11 @@ def learn(
     Writes TASK-METHOD.json and a picture of it. A result that has not converged is a result: it
     is reported as such, with exit code 0.
     """
-    from replication import figures
-    from replication.demos import load_demos
+    from replication.demos.files import load_demos
     from replication.fit import fit
     from replication.irl import get_method
-    from replication.params import Params
+    from replication.paper.params import Params
+    from replication.report import figures
 
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
@@ -360,10 +360,9 @@ def make(
 
     Writes one correct demo and incorrect ones of each kind, by the rules of the stored mazes.
     """
-    from replication.demos import save_demos
-    from replication.envs import Maze, MazeError
-    from replication.expert import demonstrate
-    from replication.params import Expert
+    from replication.demos.files import save_demos
+    from replication.demos.maze_expert import Expert, demonstrate
+    from replication.envs.maze import Maze, MazeError
 
     given: dict[str, Any] = {"leg": leg, "detour_width": detour_width}
     params = Expert(**{name: value for name, value in given.items() if value is not None})
@@ -388,7 +387,8 @@ def check(
 
     A warning is about a file that can be used, an error about one that cannot: exit code 1.
     """
-    from replication.demos import DemoError, check_demos
+    from replication.demos.checks import DemoError
+    from replication.demos.files import check_demos
 
     failed = False
     for file in files:
@@ -408,7 +408,7 @@ def check(
 @demos_app.command(epilog="Example: replicate demos schema > schema.json")
 def schema() -> None:
     """Print the JSON Schema of demonstration files."""
-    from replication.demos import json_schema
+    from replication.demos.schema import json_schema
 
     typer.echo(json.dumps(json_schema(), indent=2))
 
@@ -420,9 +420,10 @@ def choices(
     ] = None,
 ) -> None:
     """List what the paper leaves open, what we chose, and what else is accepted."""
-    from replication.choices import register, unknown_name
+    from replication.errors import unknown
+    from replication.paper.register import load_choices
 
-    entries = register()
+    entries = load_choices()
     width = shutil.get_terminal_size().columns
     if id is None:
         rows = [("ID", "DEFAULT", "ALTERNATIVES", "FIELD, DATA OR CODE")]
@@ -433,7 +434,7 @@ def choices(
         _print_table(rows, width)
         return
     if id.upper() not in entries:
-        raise unknown_name(id.upper(), list(entries), "choice")
+        _fail(unknown(id.upper(), entries, "choice"))
     one = entries[id.upper()]
     lines = {
         "id": one.id,
@@ -473,20 +474,20 @@ def _notebook(name: str) -> Path:
     """Find a notebook by its name or path."""
     path = Path(name)
     if path.suffix == ".ipynb" or len(path.parts) > 1:
-        found = paths.resolve(path)
+        found = files.resolve(path)
         return found if found.exists() else _fail(f"there is no notebook {name}")
     known = [one.stem for one in _all_notebooks()]
     if name not in known:
-        from replication.choices import unknown_name
+        from replication.errors import unknown
 
-        raise unknown_name(name, known, "notebook")
-    return paths.PROJECT / "notebooks" / f"{name}.ipynb"
+        _fail(unknown(name, known, "notebook"))
+    return files.PROJECT / "notebooks" / f"{name}.ipynb"
 
 
 def _all_notebooks() -> list[Path]:
-    found = sorted((paths.PROJECT / "notebooks").glob("*.ipynb"))
+    found = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
     if not found:
-        _fail(f"there is no notebook in {paths.PROJECT / 'notebooks'}")
+        _fail(f"there is no notebook in {files.PROJECT / 'notebooks'}")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Files that are never half-written: a draft beside the target replaces it in one step."""
+"""Files that are never half-written, and where the project's files are."""
 
 from __future__ import annotations
 
@@ -29,3 +29,24 @@ def write_file(path: str | os.PathLike[str], content: str | bytes) -> Path:
             error.filename = str(target)  # a full disk names no file, or the draft
             raise
     return target
+
+
+PROJECT = Path(__file__).resolve().parents[1]
+"""The project folder, which holds `notebooks/`, `data/` and `figures/`.
+
+:meta hide-value:
+"""
+
+
+def resolve(path: str | os.PathLike[str]) -> Path:
+    """Find a file: as given in the working folder if it is there, else in the project folder.
+
+    An absolute path is returned as it is. Whether anything exists at the result is not checked.
+
+    Examples
+    --------
+    >>> resolve("data/demos/open_maze.json").name
+    'open_maze.json'
+    """
+    given = Path(path)
+    return Path.cwd() / given if given.exists() else PROJECT / given

@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.demos import Demos, demos_document, parse_demos
+from replication.demos.files import demos_document, parse_demos
+from replication.demos.model import Demos
+from replication.errors import UserError
 from replication.files import write_file
 from replication.irl import run
-from replication.params import Params
-from replication.seeds import trial_seeds
-from replication.setting import Setting
+from replication.learning.seeds import trial_seeds
+from replication.paper.params import Params
+from replication.trials.condition import Condition
 
 FORMAT = "replication-fit"
 VERSION = 1
 
 
-class FitError(ValueError):
+class FitError(UserError):
     """A file that does not hold a fit; the message is one line."""
 
 
@@ -127,7 +129,7 @@ def fit(
     params
         Parameters; by default the registered ones with every incorrect demonstration of the file.
     seed
-        Root seed: the result equals trial 0 of :func:`replication.trials.run_trials` with it.
+        Root seed: the result equals trial 0 of :func:`replication.trials.run.run_trials` with it.
 
     Raises
     ------
@@ -151,8 +153,8 @@ def fit(
     (True, True)
     """
     chosen = params if params is not None else Params.of(incorrect="all")
-    setting = Setting(demos, method, chosen)
-    ((_, trial),) = run(setting.task, [setting.trial(seed=trial_seeds(seed, 1)[0])])
+    condition = Condition(demos, method, chosen)
+    ((_, trial),) = run(condition.agent, [condition.trial(seed=trial_seeds(seed, 1)[0])])
     return Fit(
         demos=demos,
         method=method,

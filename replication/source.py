@@ -17,14 +17,20 @@ from pathlib import Path
 PACKAGE = __name__.split(".")[0]
 
 
-@cache
-def source_hash(module: str) -> str:
-    """Return the SHA-256 of `module` and of all modules of the package that it imports.
+SILENT = frozenset(
+    f"{PACKAGE}.{name}" for name in ("demos.checks", "errors", "irl.methods", "source")
+)
+"""Modules that change no trial: they check, phrase messages, list methods, or hash."""
 
-    The data files beside the package's modules are not code and do not count.
+
+@cache
+def source_hash(*modules: str) -> str:
+    """Return the SHA-256 of some modules and of all modules of the package that they import.
+
+    Modules in `SILENT`, and what only they import, do not count. Neither do data files.
     """
     digest = hashlib.sha256()
-    for name, tree in sorted(_closure([module]).items()):
+    for name, tree in sorted(_closure(modules, without=SILENT).items()):
         digest.update(f"{name}\n{ast.unparse(_bare(tree))}\n".encode())
     return digest.hexdigest()
 
@@ -54,12 +60,14 @@ def bare_source(text: str) -> str:
         return text
 
 
-def _closure(modules: Iterable[str]) -> dict[str, ast.Module]:
+def _closure(
+    modules: Iterable[str], *, without: frozenset[str] = frozenset()
+) -> dict[str, ast.Module]:
     found: dict[str, ast.Module] = {}
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name in found:
+        if name in found or name in without:
             continue
         spec = find_spec(name)
         if spec is None or spec.origin is None:
@@ -88,8 +96,10 @@ def _is_module(name: str) -> bool:
 
 
 def _bare(tree: ast.Module) -> ast.Module:
-    """Return the tree without docstrings and other expressions that only hold text."""
+    """Return the tree without docstrings, other bare text, and the messages of errors."""
     for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            node.exc.args, node.exc.keywords = [], []
         body = getattr(node, "body", None)
         if isinstance(body, list):
             kept = [

@@ -6,10 +6,9 @@ from typing import Any
 import nbformat
 import pytest
 
-from replication import Demos, Maze, demonstrate, execution, load_demos, paths
-from replication.files import write_file
-from replication.notebooks import Notebook
-from replication.paths import PROJECT
+from replication import Demos, Maze, demonstrate, files, load_demos
+from replication.files import PROJECT, write_file
+from replication.pipeline.notebook import Notebook
 
 SMALL = """
     .......
@@ -42,8 +41,8 @@ def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             (stage / name).write_text(notebook.name)
         write_file(executed, str(nbformat.writes(notebook.load())))
 
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
-    monkeypatch.setattr(execution, "execute", execute)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
+    monkeypatch.setattr(execute, "execute", execute)
     (tmp_path / "environment.lock").touch()
     return tmp_path
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from replication.choices import register
 from replication.irl import adaboost
-from replication.params import Update
+from replication.paper.params import Update
+from replication.paper.register import load_choices
 
-ENTRY = register()["ADABOOST-RULE"]
+ENTRY = load_choices()["ADABOOST-RULE"]
 RULES = [str(rule) for rule in (ENTRY.default, *ENTRY.alternatives)]
 NONE = np.zeros((1, 4), dtype=bool)
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from replication import Demos
-from replication.calibration import (
+from replication.envs.maze import as_maze
+from replication.evidence.calibration import (
     CALIBRATED,
     PAIR,
     ROOT,
@@ -22,16 +23,16 @@ from replication.calibration import (
     divergence,
     findings,
     grid,
-    grid_settings,
+    grid_conditions,
     readable_check,
 )
-from replication.choices import register
-from replication.claims import claims
-from replication.paper import Published
-from replication.paths import PROJECT
-from replication.store import Store
-from replication.tables import read_table
-from replication.trials import run_trials
+from replication.evidence.claims import load_claims
+from replication.evidence.tables import read_table
+from replication.files import PROJECT
+from replication.paper.published import Published
+from replication.paper.register import load_choices
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 STORED = PROJECT / "figures" / "calibration.csv"
 
@@ -97,59 +98,59 @@ def test_grid_has_all_registered_values() -> None:
     points = grid()
     assert len(points) == len(set(points)) == 120
     for at, id in enumerate(CALIBRATED):
-        entry = register()[id]
+        entry = load_choices()[id]
         values = {entry.default, *entry.alternatives} - ({0.0} if id == "ALPHA" else set())
         assert {point[at] for point in points} == values
     assert chosen() in points
-    assert all(register()[id].rule.startswith("Calibrated") for id in CALIBRATED)
-    assert {id for id, one in register().items() if one.rule.startswith("Calibrated")} == set(
+    assert all(load_choices()[id].rule.startswith("Calibrated") for id in CALIBRATED)
+    assert {id for id, one in load_choices().items() if one.rule.startswith("Calibrated")} == set(
         CALIBRATED
     )
 
 
 def test_calibration_is_apart_from_the_judging_run() -> None:
     """Its root seed is among the explored ones, and what it used gets no verdict."""
-    assert claims().judging.root_seed != ROOT
-    assert any(ROOT in run.root_seeds for run in claims().explored)
+    assert load_claims().judging.root_seed != ROOT
+    assert any(ROOT in run.root_seeds for run in load_claims().explored)
     for id in ("MEAN-UNIFIED-OPEN", "SD-UNIFIED-OPEN"):
-        claim = claims().by_id(id)
+        claim = load_claims().by_id(id)
         assert "printed" in claim.used
         assert claim.published("unified").mean == PAIR.mean
 
 
 def test_settings_differ_in_the_grid_alone(small_demos: Demos) -> None:
-    """Each point is a setting of the unified method with its four values, all else at defaults."""
-    settings = grid_settings(small_demos.maze)
-    assert list(settings) == grid()
-    for (leg, alpha, f_start, ties), setting in settings.items():
-        params = setting.params
-        assert setting.method == "unified"
+    """Each point is a condition of the unified method with its four values, all else at defaults."""
+    conditions = grid_conditions(as_maze(small_demos.environment))
+    assert list(conditions) == grid()
+    for (leg, alpha, f_start, ties), condition in conditions.items():
+        params = condition.params
+        assert condition.method == "unified"
         assert (params.update.alpha, params.update.f_start) == (alpha, f_start)
         assert params.learner.ties == ties
         assert set(params.differences()) <= set(CALIBRATED)
-        other = settings[leg, *chosen()[1:]]
-        assert setting.demos == other.demos
-    assert settings[chosen()].params.differences() == {}
+        other = conditions[leg, *chosen()[1:]]
+        assert condition.demos == other.demos
+    assert conditions[chosen()].params.differences() == {}
 
 
 def test_table_of_a_run(small_demos: Demos, tmp_path: object) -> None:
     """The table has the trials' own numbers, the nearest point first, and one default."""
-    every = grid_settings(small_demos.maze)
+    every = grid_conditions(as_maze(small_demos.environment))
     points = [chosen(), (2, 0.9, 0.5, "random"), (2, 0.1, 1.0, "first")]
-    settings = {point: every[point] for point in points}
+    conditions = {point: every[point] for point in points}
     store = Store(tmp_path / "trials.sqlite")  # type: ignore[operator]
-    results = run_trials(list(settings.values()), trials=4, store=store, seed=ROOT)
-    table = calibration_table(results, settings)
+    results = run_trials(list(conditions.values()), trials=4, store=store, seed=ROOT)
+    table = calibration_table(results, conditions)
     assert table["default"].sum() == 1
     assert table["divergence"].is_monotonic_increasing
     for row in table.to_dict("records"):
-        setting = settings[tuple(row[id] for id in CALIBRATED)]
-        counts = results.iterations(setting)
+        condition = conditions[tuple(row[id] for id in CALIBRATED)]
+        counts = results.iterations(condition)
         assert (row["n"], row["capped"]) == (4, 0)
         assert row["mean"] == pytest.approx(counts.mean())
         assert row["sd"] == pytest.approx(counts.std(ddof=1))
         assert row["divergence"] == divergence(row["mean"], row["sd"], PAIR)
-        assert row["default"] == (setting is settings[chosen()])
+        assert row["default"] == (condition is conditions[chosen()])
 
 
 # --- what is said of it ----------------------------------------------------------------------
@@ -259,7 +260,7 @@ def test_published_check_is_that_of_the_judging_run(stored: pd.DataFrame) -> Non
     """The new trials are those that the claims are judged by, the others those of the grid."""
     check = read_table(PROJECT / "figures" / "calibration_check.csv")
     judged = read_table(PROJECT / "figures" / "claims.csv")
-    assert check["n"].tolist() == [TRIALS, *[claims().judging.trials["open-maze"]] * 2]
+    assert check["n"].tolist() == [TRIALS, *[load_claims().judging.trials["open-maze"]] * 2]
     assert check.loc[0, ["mean", "sd"]].tolist() == stored.loc[0, ["mean", "sd"]].tolist()
     names = ["effect", "low", "high", "predicted_low", "predicted_high"]
     for id, own in (

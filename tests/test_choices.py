@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 
-from replication import params
-from replication.choices import Choice, ChoiceError, Chosen, register, unknown_name
-from replication.envs.soccer import SoccerParams
-from replication.paths import PROJECT
+from replication.envs.soccer.rules import SoccerParams
+from replication.errors import unknown
+from replication.files import PROJECT
+from replication.paper import params
+from replication.paper.register import Choice, ChoiceError, Chosen, load_choices
 
-ENTRIES = list(register().values())
+ENTRIES = list(load_choices().values())
 IDS = [one.id for one in ENTRIES]
 CLASSES = [
     kind
@@ -131,9 +132,9 @@ def test_ends_of_a_range_belong_to_it() -> None:
 
 def test_near_miss_is_suggested() -> None:
     """An unknown name is answered with the nearest known one, and with all of them."""
-    error = unknown_name("aplha", ["alpha", "beta"], "parameter")
-    assert str(error) == ("unknown parameter 'aplha' (did you mean 'alpha'?); known: alpha, beta")
-    assert "did you mean" not in str(unknown_name("xyz", ["alpha", "beta"], "parameter"))
+    message = unknown("aplha", ["alpha", "beta"], "parameter")
+    assert message == ("unknown parameter 'aplha' (did you mean 'alpha'?); known: alpha, beta")
+    assert "did you mean" not in unknown("xyz", ["alpha", "beta"], "parameter")
 
 
 @pytest.mark.parametrize(
@@ -149,10 +150,4 @@ def test_register_with_a_slip_is_refused(
     (tmp_path / "choices.toml").write_text(text)
     monkeypatch.setattr(resources, "files", lambda package: tmp_path)
     with pytest.raises(ChoiceError, match=message):
-        register.__wrapped__()
-
-
-def test_stated_values_are_told_from_open_ones() -> None:
-    """The learning rate is stated by the paper; the update rate of the trace is not."""
-    assert register()["BETA"].is_stated
-    assert not register()["ALPHA"].is_stated
+        load_choices.__wrapped__()

@@ -9,8 +9,15 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from replication.calibration import CALIBRATED, PAIR, grid
-from replication.claim_figures import (
+from replication.evidence.calibration import CALIBRATED, PAIR, grid
+from replication.evidence.claims import LABELS, load_claims
+from replication.evidence.sensitivity import outcome_shares
+from replication.evidence.specifications import (
+    factorial_specifications,
+    load_specifications,
+    single_specifications,
+)
+from replication.report.claim_figures import (
     OUTCOMES,
     UNITS,
     calibration_figure,
@@ -26,17 +33,14 @@ from replication.claim_figures import (
     shares_figure,
     single_figure,
 )
-from replication.claims import LABELS, claims
-from replication.figures import save_figure
-from replication.sensitivity import outcome_shares
-from replication.specifications import declared, factorial_specifications, single_specifications
+from replication.report.figures import save_figure
 
-MAZES = declared().mazes
+MAZES = load_specifications().mazes
 FACTORIAL = factorial_specifications(MAZES.factorial)
 SINGLE = single_specifications(MAZES.single.choices)
-SOCCER = single_specifications(declared().soccer.single.choices)
-DRAWN = [claims().by_id(id) for id in ("FASTER", "STEADIER", "SAVES-OPEN", "AVOIDS-OPEN")]
-KICKED = [claims().by_id(id) for id in ("SAVES-SOCCER", "ZERO-SOCCER", "AVOIDS-SOCCER")]
+SOCCER = single_specifications(load_specifications().soccer.single.choices)
+DRAWN = [load_claims().by_id(id) for id in ("FASTER", "STEADIER", "SAVES-OPEN", "AVOIDS-OPEN")]
+KICKED = [load_claims().by_id(id) for id in ("SAVES-SOCCER", "ZERO-SOCCER", "AVOIDS-SOCCER")]
 
 
 def some_effects() -> pd.DataFrame:
@@ -72,8 +76,8 @@ def some_verdicts() -> pd.DataFrame:
     """Return a table of verdicts: one of each kind, and NaN where all trials are at the cap."""
     words = ["reproduced", "not reproduced", "reversed", "undecided", "not testable"]
     rows = []
-    for number, claim in enumerate(claims().claim):
-        for at, f in enumerate(claims().judging.readings):
+    for number, claim in enumerate(load_claims().claim):
+        for at, f in enumerate(load_claims().judging.readings):
             verdict = words[(number + at) % len(words)]
             effect = np.nan if verdict == "not testable" else 1.5 + number / 10 + at
             keys = ("id", "measure", "statistic", "direction", "margin")
@@ -221,7 +225,7 @@ def test_verdicts_stand_in_words(drawings: dict[str, Figure]) -> None:
 
 def test_every_comparative_claim_has_a_label_and_a_unit() -> None:
     """A claim that is added to the file has to be named here too."""
-    comparative = [one for one in claims().claim if not one.statistic.startswith("published")]
+    comparative = [one for one in load_claims().claim if not one.statistic.startswith("published")]
     assert {one.id for one in comparative} == set(LABELS)
     assert {(one.statistic, one.measure) for one in comparative} == set(UNITS)
 

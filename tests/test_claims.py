@@ -13,25 +13,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from replication.claims import (
+from replication.evidence.claims import (
     TESTS,
     Claim,
     ClaimError,
     canonical_hash,
-    claims,
     criteria_hash,
+    load_claims,
     parse_claims,
 )
-from replication.comparisons import EXPERIMENTS, F_INDICES
-from replication.irl import METHODS
-from replication.paper import FIGURE_5, FIGURE_12, TABLE_1, TABLE_2, Published
-from replication.paths import PROJECT
-from replication.statistics import CONFIDENCE, FEWEST
-from replication.tables import read_table
+from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.statistics import CONFIDENCE, FEWEST
+from replication.evidence.tables import read_table
+from replication.files import PROJECT
+from replication.irl import METHODS, READINGS
+from replication.paper.published import FIGURE_5, FIGURE_12, TABLE_1, TABLE_2, Published
 
 TEXT = (PROJECT / "replication" / "claims.toml").read_text(encoding="utf-8")
 DOCUMENT = tomllib.loads(TEXT)
-CLAIMS = claims().claim
+CLAIMS = load_claims().claim
 NAMES = [one.id for one in CLAIMS]
 
 DEMANDED = {
@@ -182,9 +182,9 @@ def test_published_statistic_needs_its_numbers() -> None:
 
 def test_unknown_claim_has_the_nearest_named() -> None:
     """An id that does not exist is answered with the one that was probably meant."""
-    assert claims().by_id("FASTER") == CLAIMS[0]
+    assert load_claims().by_id("FASTER") == CLAIMS[0]
     with pytest.raises(ClaimError, match=r"unknown claim 'FASTR' \(did you mean 'FASTER'\?\)"):
-        claims().by_id("FASTR")
+        load_claims().by_id("FASTR")
 
 
 # --- the frozen file -------------------------------------------------------------------------
@@ -224,8 +224,8 @@ def test_published_effects_by_hand() -> None:
         "RUN-UNIFIED-OPEN": 47,
     }
     for id, effect in due.items():
-        assert claims().by_id(id).paper_effect == pytest.approx(effect)
-    assert math.isnan(claims().by_id("ZERO-OPEN").paper_effect)
+        assert load_claims().by_id(id).paper_effect == pytest.approx(effect)
+    assert math.isnan(load_claims().by_id("ZERO-OPEN").paper_effect)
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=NAMES)
@@ -241,11 +241,11 @@ def test_claim_can_be_judged(claim: Claim) -> None:
 
 def test_numbers_of_the_criteria_are_those_of_the_code() -> None:
     """Confidence, fewest trials and readings are what the statistics and the notebooks use."""
-    judging = claims().judging
+    judging = load_claims().judging
     assert judging.confidence == CONFIDENCE
     assert judging.fewest == FEWEST
     assert judging.level == pytest.approx(1 - CONFIDENCE)
-    assert judging.readings == F_INDICES
+    assert judging.readings == READINGS
     assert min(judging.trials.values()) >= judging.fewest
     assert set(judging.trials) == set(EXPERIMENTS)
 

@@ -11,11 +11,11 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
-from replication import paths
-from replication.cleaning import clean
-from replication.notebooks import NotebookError
-from replication.provenance import MANIFEST, read_manifest, record
-from replication.runs import Run, prepare
+from replication import files
+from replication.pipeline.cleaning import clean
+from replication.pipeline.notebook import NotebookError
+from replication.pipeline.plan import Run, prepare
+from replication.pipeline.provenance import MANIFEST, read_manifest, record
 
 Clean = Callable[..., list[str]]
 
@@ -35,7 +35,7 @@ def write(project: Path, name: str) -> Run:
 @pytest.fixture
 def out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project in which the notebooks `one` and `two` have run, and `two` is gone."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
     (tmp_path / "environment.lock").touch()
     (tmp_path / "out").mkdir()
     for name in ("one", "two"):

@@ -18,21 +18,13 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 from typer.testing import CliRunner, Result
 
-from replication import (
-    Fit,
-    Maze,
-    MazeError,
-    cli,
-    demonstrate,
-    load_demos,
-    paths,
-    regenerate,
-    save_demos,
-)
-from replication.choices import register
-from replication.demos import Demos, json_schema
+from replication import Fit, Maze, MazeError, cli, demonstrate, files, load_demos, save_demos
+from replication.demos.maze_expert import Expert
+from replication.demos.model import Demos
+from replication.demos.schema import json_schema
 from replication.irl import METHODS
-from replication.params import Expert
+from replication.paper.register import load_choices
+from replication.pipeline import run
 
 
 def replicate(*words: str | Path) -> Result:
@@ -66,7 +58,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "notebooks").mkdir()
     nbformat.write(node, tmp_path / "notebooks" / "toy.ipynb")
     (tmp_path / "environment.lock").touch()
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
     return tmp_path
 
 
@@ -338,7 +330,7 @@ def test_the_recommended_command_works(
 
 def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything that is wrong has a line on stderr, and any of it makes the code 1."""
-    monkeypatch.setattr("replication.verification.PROJECT", project)
+    monkeypatch.setattr("replication.pipeline.verify.PROJECT", project)
     result = replicate("verify")
     assert result.exit_code == 1
     assert "provenance.json is missing" in result.stderr
@@ -401,7 +393,7 @@ def test_learn_writes_result_and_picture(demo_file: Path, tmp_path: Path) -> Non
 
 def test_learn_says_that_it_has_not_converged(demo_file: Path, tmp_path: Path) -> None:
     """A result at the iteration cap is a result, exit code 0, but never called converged."""
-    cap = str(register()["ITERATION-CAP"].range[0])  # type: ignore[index]
+    cap = str(load_choices()["ITERATION-CAP"].range[0])  # type: ignore[index]
     words: list[str | Path] = ["--out", tmp_path, "--method", "unified"]
     result = replicate("learn", demo_file, *words, "-p", "max_iterations", cap)
     assert result.exit_code == 0
@@ -499,7 +491,7 @@ def test_choices_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     table = replicate("choices").stdout
     assert max(map(len, table.splitlines())) <= 120
     joined = re.sub(r"\s", "", table)
-    for id, one in register().items():
+    for id, one in load_choices().items():
         assert id in joined
         whole = " ".join(replicate("choices", id.lower()).stdout.split())
         assert id in whole
@@ -523,7 +515,7 @@ def test_faults_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPa
         def fail(error: ValueError = error) -> None:
             raise error
 
-        monkeypatch.setattr("replication.demos.json_schema", fail)
+        monkeypatch.setattr("replication.demos.schema.json_schema", fail)
         result = replicate("demos", "schema")
         assert result.exit_code == code
         assert ("error: mine" in result.stderr) == (code == 2)
@@ -548,15 +540,15 @@ def test_help_knows_every_method() -> None:
 
 def test_time_limit_has_one_default() -> None:
     """The help shows the limit that the library has."""
-    assert f"default: {regenerate.TIMEOUT}" in replicate("run", "--help").stdout
+    assert f"default: {run.TIMEOUT}" in replicate("run", "--help").stdout
 
 
 def test_paths_prefer_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file here wins over one in the project; an absolute path stays as it is."""
     monkeypatch.chdir(tmp_path)
     name = "data/demos/open_maze.json"
-    assert paths.resolve(name) == paths.PROJECT / name
+    assert files.resolve(name) == files.PROJECT / name
     (tmp_path / name).parent.mkdir(parents=True)
     (tmp_path / name).touch()
-    assert paths.resolve(name) == tmp_path / name
-    assert paths.resolve(tmp_path / "none") == tmp_path / "none"
+    assert files.resolve(name) == tmp_path / name
+    assert files.resolve(tmp_path / "none") == tmp_path / "none"

@@ -16,10 +16,11 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Demos
 from replication.irl import Trial
-from replication.params import Params
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import SCHEDULER, Results, WorkerError, run_trials
+from replication.paper.params import Params
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+from replication.trials.run import SCHEDULER, WorkerError, run_trials
+from replication.trials.store import Store
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -83,19 +84,19 @@ def start(tmp_path: Path) -> Iterator[StartCluster]:
 
 
 def _run(demos: Demos, path: Path, episodes: int = 60) -> Results:
-    settings = [
-        Setting(demos, "unified", Params.of(episodes=episodes + n, horizon=40, max_iterations=40))
+    conditions = [
+        Condition(demos, "unified", Params.of(episodes=episodes + n, horizon=40, max_iterations=40))
         for n in range(TASKS)
     ]
-    return run_trials(settings, trials=TRIALS, store=Store(path), seed=5)
+    return run_trials(conditions, trials=TRIALS, store=Store(path), seed=5)
 
 
 def _bits(results: Results) -> list[bytes]:
     return [
         array.tobytes()
-        for setting in results.settings
+        for condition in results.conditions
         for k in range(results.trials)
-        for trial in [results.trial(setting, k)]
+        for trial in [results.trial(condition, k)]
         for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
     ]
 
@@ -150,9 +151,9 @@ def test_a_notebook_runs_on_a_cluster(
         new_code_cell(
             "import os\nfrom pathlib import Path\n"
             "from replication import Maze, demonstrate, trials\n"
-            "from replication.params import Params\n"
-            "from replication.setting import Setting\n"
-            "from replication.store import Store\n"
+            "from replication.paper.params import Params\n"
+            "from replication.trials.condition import Setting\n"
+            "from replication.trials.store import Store\n"
             "maze = Maze.from_text('....G\\n.#...\\nS....')\n"
             "params = Params.of(episodes=60, horizon=40, max_iterations=40)\n"
             "setting = Setting(demonstrate('small', maze), 'unified', params)\n"

@@ -7,17 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from replication.demochecks import (
-    DemoError,
-    action_numbers,
-    check_moves,
-    clip,
-    compact,
-    replay,
-    show,
-    suggest,
-)
-from replication.envs import ACTIONS, Maze
+from replication.demos.checks import DemoError, action_numbers, check_moves, replay
+from replication.envs.maze import ACTIONS, Maze
+from replication.errors import clip, compact, show, suggest
 
 MAZE = Maze(("S.#", "..G"))
 WAY = np.array([2, 1, 2])  # right, down, right

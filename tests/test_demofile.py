@@ -9,10 +9,10 @@ from typing import Any
 import jsonschema  # type: ignore[import-untyped] # it ships no types
 import pytest
 
-from replication import demofile
-from replication.demochecks import DemoError
-from replication.demofile import MazeFields, json_schema, read_fields
-from replication.envs import ACTIONS, Maze
+from replication.demos import schema
+from replication.demos.checks import DemoError
+from replication.demos.schema import MazeFields, json_schema, read_fields
+from replication.envs.maze import ACTIONS, Maze
 
 DATA = Path(__file__).parent.parent / "data" / "demos"
 STORED = sorted(path for path in DATA.glob("*.json") if path.name != "schema.json")
@@ -250,6 +250,6 @@ def test_stored_files_keep_the_schema(path: Path) -> None:
 
 def test_docstring_example_is_sound() -> None:
     """The file that the module shows can be read."""
-    shown = re.search(r"json\n\n(    \{.*?\n    \})\n", demofile.__doc__ or "", re.DOTALL)
+    shown = re.search(r"json\n\n(    \{.*?\n    \})\n", schema.__doc__ or "", re.DOTALL)
     assert shown is not None
     assert [demo.kind for demo in read_fields(shown[1].encode()).incorrect] == ["hit"]

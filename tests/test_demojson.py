@@ -9,8 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from replication.demochecks import DemoError
-from replication.demojson import MAX_BYTES, layout, read_content, read_json
+from replication.demos.checks import DemoError
+from replication.demos.strict_json import MAX_BYTES, layout, read_content, read_json
 
 VALUES = st.recursive(
     st.none()

@@ -13,17 +13,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from replication.demos import (
-    Demo,
-    DemoError,
-    Demos,
-    DemoWarning,
-    check_demos,
-    content_hash,
-    load_demos,
-    save_demos,
-)
-from replication.envs import ACTIONS, Maze
+from replication.demos.checks import DemoError, DemoWarning
+from replication.demos.files import check_demos, load_demos, save_demos
+from replication.demos.model import Demo, Demos, content_hash
+from replication.envs.maze import ACTIONS, Maze
 
 DATA = Path(__file__).parent.parent / "data" / "demos"
 STORED = sorted(path for path in DATA.glob("*.json") if path.name != "schema.json")

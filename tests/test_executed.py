@@ -8,8 +8,8 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from replication.executed import linked, rendered
-from replication.notebooks import Notebook, read_notebook
+from replication.pipeline.notebook import Notebook, read_notebook
+from replication.pipeline.rendering import linked, rendered
 
 PICTURE, OTHER = b"\x89PNG one", b"\x89PNG two"
 

@@ -10,11 +10,11 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import paths
-from replication.executed import rendered
-from replication.execution import execute
+from replication import files
 from replication.files import write_file
-from replication.notebooks import NotebookError, RunError, read_notebook
+from replication.pipeline.execute import execute
+from replication.pipeline.notebook import NotebookError, RunError, read_notebook
+from replication.pipeline.rendering import rendered
 from replication.progress import Display
 
 PARAMETERS = 'trials = 3\nname = "a"\njobs = 1\nstore = "build/s"\nout = "build"'
@@ -34,7 +34,7 @@ Run = Callable[..., bytes]
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with the notebook `toy`."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
     write(tmp_path, CODE)
     return tmp_path
 
@@ -114,7 +114,7 @@ def test_folders_outside_the_project_are_named_only(
 ) -> None:
     """Where the outputs are on this machine is nobody's business."""
     (project / "inner").mkdir()
-    monkeypatch.setattr(paths, "PROJECT", project / "inner")
+    monkeypatch.setattr(files, "PROJECT", project / "inner")
     content = run().decode()
     assert str(project) not in content
     assert cells(content.encode())[-1].outputs[-1].data["text/plain"].count("figures/a.txt") == 1
@@ -153,7 +153,10 @@ def test_a_failed_notebook_can_be_seen(run: Run, project: Path) -> None:
 
 def test_mistakes_are_the_users(run: Run, project: Path) -> None:
     """What the package refuses is told as a mistake, in one line."""
-    write(project, "from replication.choices import ChoiceError\nraise ChoiceError('so\\nmore')")
+    write(
+        project,
+        "from replication.paper.register import ChoiceError\nraise ChoiceError('so\\nmore')",
+    )
     with pytest.raises(NotebookError, match=r"toy\.ipynb: so$"):
         run()
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from replication import Demos, Maze, MazeError, demonstrate, load_demos
-from replication.expert import OPPOSITE, _way, correct_actions, random_actions
-from replication.paper import MOVES
-from replication.params import Expert
-from replication.paths import PROJECT
+from replication.demos.maze_expert import OPPOSITE, Expert, _way, correct_actions, random_actions
+from replication.envs.maze import as_maze
+from replication.files import PROJECT
+from replication.paper.published import MOVES
 
 STEPS = ((-1, 0), (1, 0), (0, 1), (0, -1))  # up, down, right, left
 DETOURS = ("detour", "near-detour", "far-detour")
@@ -94,7 +94,7 @@ def cost(actions: list[int], leg: int) -> int:
 def test_stored_files_follow_from_the_rules(name: str) -> None:
     """A stored file is what the expert makes of its map with the registered parameters."""
     stored = load_demos(PROJECT / "data" / "demos" / f"{name}.json")
-    made = demonstrate(stored.task, stored.maze, description=stored.description)
+    made = demonstrate(stored.task, as_maze(stored.environment), description=stored.description)
     assert made == stored
 
 
@@ -102,13 +102,13 @@ def test_stored_correct_demonstrations_are_the_papers_shortest_paths(stored_demo
     """31 and 33 moves, as the paper says, and no way in the map is shorter."""
     (correct,) = stored_demos.correct
     assert len(correct.actions) == MOVES[stored_demos.task]
-    assert len(correct.actions) == shortest(stored_demos.maze.rows)
+    assert len(correct.actions) == shortest(as_maze(stored_demos.environment).rows)
 
 
 def test_stored_mazes_share_start_and_goal() -> None:
     """Both mazes have 20 x 20 cells, the same start and the same goal; one has no obstacles."""
     one, other = (
-        load_demos(PROJECT / "data" / "demos" / f"{name}.json").maze
+        as_maze(load_demos(PROJECT / "data" / "demos" / f"{name}.json").environment)
         for name in ("open_maze", "obstacle_maze")
     )
     assert one.shape == other.shape == (20, 20)
@@ -179,8 +179,10 @@ def test_too_many_paths_to_number_are_refused() -> None:
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_demonstrations_along_a_random_path(stored_demos: Demos, number: int) -> None:
     """DEMO-PATH random-n: the correct demonstration is the path of seed n, the rules go on."""
-    demos = demonstrate("t", stored_demos.maze, params=Expert(path=f"random-{number}"))
-    due = random_actions(stored_demos.maze, seed=np.random.SeedSequence(number))
+    demos = demonstrate(
+        "t", as_maze(stored_demos.environment), params=Expert(path=f"random-{number}")
+    )
+    due = random_actions(as_maze(stored_demos.environment), seed=np.random.SeedSequence(number))
     assert demos.correct[0].actions.tolist() == due
     assert len(due) == MOVES[stored_demos.task]
     check_kinds(demos)
@@ -248,7 +250,7 @@ def test_demonstrations_of_the_stored_mazes(stored_demos: Demos) -> None:
 
 def check_kinds(demos: Demos) -> None:
     """Assert what tells each kind of incorrect demonstration."""
-    maze, (correct,) = demos.maze, demos.correct
+    maze, (correct,) = as_maze(demos.environment), demos.correct
     actions = correct.actions.tolist()
     corners = [t for t, (a, b) in enumerate(pairwise(actions), start=1) if a != b]
     for demo in demos.incorrect:

@@ -29,14 +29,15 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 from typer.testing import CliRunner
 
-from replication import Demos, cli, demonstrate, execution, paths, save_demos
-from replication.envs import Maze
+from replication import Demos, cli, demonstrate, files, save_demos
+from replication.envs.maze import Maze
 from replication.files import write_file
-from replication.notebooks import Notebook
-from replication.params import Params
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import Results, run_trials
+from replication.paper.params import Params
+from replication.pipeline.notebook import Notebook
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 
@@ -57,7 +58,7 @@ from pathlib import Path
 from replication import load_demos
 from replication import trials as computing
 from replication.params import Params
-from replication.setting import Setting
+from replication.condition import Condition
 from replication.store import Store
 
 compute = computing.compute
@@ -82,7 +83,7 @@ settings = [
 results = computing.run_trials(settings, trials=trials, store=Store(store), jobs=jobs, seed=seed)
 """,
     """
-rows = [f"{d.hex()}" for setting in settings for d in results.errors(setting).ravel().tolist()]
+rows = [f"{d.hex()}" for condition in conditions for d in results.errors(condition).ravel().tolist()]
 (Path(out) / "curves.csv").write_text("\\n".join(rows))
 results.frame().to_csv(Path(out) / "trials.csv", index=False)
 print(len(rows), "numbers in", out)
@@ -476,14 +477,14 @@ def test_a_full_disk_leaves_the_old_output(checkout: Checkout, trials: int) -> N
 def test_every_write_may_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whichever write finds the disk full: one error line, whole files, and a later run mends."""
     notebook(tmp_path / "notebooks" / "toy.ipynb", "1", outputs=["a.txt"], parameters='out = "x"')
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
     content = {"text": "old"}
 
     def execute(notebook: Notebook, _: object, stage: Path, *, executed: Path, **__: Any) -> None:
         (stage / "a.txt").write_text(content["text"])
         write_file(executed, notebook.text)
 
-    monkeypatch.setattr(execution, "execute", execute)
+    monkeypatch.setattr(execute, "execute", execute)
     (tmp_path / "environment.lock").touch()
     words = ["run"]
     assert CliRunner().invoke(cli.app, words).exit_code == 0
@@ -753,19 +754,19 @@ def test_foreign_kernels_are_not_used(checkout: Checkout, reference: Reference) 
 
 
 def _results(demos: Demos, path: Path) -> Results:
-    settings = [
-        Setting(demos, "unified", Params.of(episodes=60 + n, horizon=40, max_iterations=40))
+    conditions = [
+        Condition(demos, "unified", Params.of(episodes=60 + n, horizon=40, max_iterations=40))
         for n in range(4)
     ]
-    return run_trials(settings, trials=3, store=Store(path), seed=5)
+    return run_trials(conditions, trials=3, store=Store(path), seed=5)
 
 
 def _bits(results: Results) -> list[bytes]:
     return [
         array.tobytes()
-        for setting in results.settings
+        for condition in results.conditions
         for k in range(results.trials)
-        for trial in [results.trial(setting, k)]
+        for trial in [results.trial(condition, k)]
         for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
     ]
 

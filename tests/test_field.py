@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from replication import DemoError
-from replication.demojson import layout
-from replication.demos import demos_document, parse_demos
-from replication.envs.chipmunk import FastSoccerWorld
-from replication.envs.field import SoccerField
-from replication.envs.soccer import N_STATES, SoccerParams, encode
-from replication.soccer_expert import demonstrate_soccer
+from replication.demos.files import demos_document, parse_demos
+from replication.demos.soccer_expert import demonstrate_soccer
+from replication.demos.strict_json import layout
+from replication.envs.soccer.compiled import FastSoccerWorld
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import N_STATES, SoccerParams, encode
 
 
 def test_replay_is_what_the_world_does() -> None:

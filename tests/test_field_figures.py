@@ -11,11 +11,13 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
 
 from replication import Demos
-from replication.demos import DemoError
-from replication.envs import soccer
-from replication.envs.field import SoccerField
-from replication.envs.soccer import BACKWARD, FORWARD, LEFT, SLOW, SoccerWorld
-from replication.field_figures import (
+from replication.demos.checks import DemoError
+from replication.demos.soccer_expert import demonstrate_soccer
+from replication.envs.soccer import rules
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import BACKWARD, FORWARD, LEFT, SLOW
+from replication.envs.soccer.world import SoccerWorld
+from replication.report.field_figures import (
     FieldAnimation,
     animate,
     describe_field,
@@ -26,8 +28,7 @@ from replication.field_figures import (
     soccer_demos_figure,
     trace,
 )
-from replication.figures import save_figure
-from replication.soccer_expert import demonstrate_soccer
+from replication.report.figures import save_figure
 
 FIELD = SoccerField()
 CUT = 6
@@ -49,7 +50,7 @@ def moving(demos: Demos) -> FieldAnimation:
     """Show an episode that goes on, one that ends soon and one that has no more actions."""
     hit = demos.incorrect[0].actions.tolist()
     return animate(
-        SoccerField(soccer.SoccerParams(drive_time=0.4)),
+        SoccerField(rules.SoccerParams(drive_time=0.4)),
         {"first & <early>": [LEFT] * 9, "middle": hit, "last": [FORWARD] * CUT},
         decisions=CUT,
     )
@@ -70,7 +71,7 @@ def test_correct_demo_scores_and_slows_down(demos: Demos) -> None:
     """The expert drives slowly exactly while it detects an obstacle, and ends with a goal."""
     one = trace(FIELD, demos.correct[0].actions)
     assert (one.scored, one.outcome, one.timed_out) == (True, "goal", False)
-    assert one.balls[-1, 0] >= soccer.GOAL_X
+    assert one.balls[-1, 0] >= rules.GOAL_X
     np.testing.assert_array_equal(one.detected[:-1], one.actions == SLOW)
     assert 0 < one.detected.sum() < len(one.actions)
     assert not one.touched.any()
@@ -94,7 +95,7 @@ def test_trace_equals_the_plain_world(demos: Demos) -> None:
         assert tuple(one.poses[t]) == world.pose
         assert tuple(one.balls[t]) == world.ball
         np.testing.assert_array_equal(one.obstacles[t], [place[:2] for place in world.obstacles])
-        assert one.detected[t] == soccer.decode(world.state)[2]
+        assert one.detected[t] == rules.decode(world.state)[2]
         if action is not None:
             world.step(action)
     assert one.touched.tolist() == [False] * (len(actions) - 1) + [True]
@@ -104,7 +105,7 @@ def test_trace_stops_when_the_episode_is_over(demos: Demos) -> None:
     """Actions after a goal, or after the time is up, are left out."""
     right = demos.correct[0].actions.tolist()
     assert trace(FIELD, [*right, LEFT, LEFT]).actions.tolist() == right
-    short = SoccerField(soccer.SoccerParams(time_limit=60.0))
+    short = SoccerField(rules.SoccerParams(time_limit=60.0))
     late = trace(short, [LEFT] * 300)
     assert late.outcome == "time out"
     assert late.times[-2] < 60 <= late.times[-1]
@@ -121,7 +122,7 @@ def test_numbers_equal_the_replay(demos: Demos) -> None:
         assert rows["decision"].tolist() == list(range(len(demo.states)))
         assert set(rows["kind"]) == {demo.kind}
         places = zip(rows["x"], rows["y"], rows["detected"], strict=True)
-        assert [soccer.encode(*place) for place in places] == demo.states.tolist()
+        assert [rules.encode(*place) for place in places] == demo.states.tolist()
 
 
 def test_ways_are_drawn_as_replayed(drawings: dict[str, Figure], demos: Demos) -> None:
@@ -147,7 +148,7 @@ def test_contacts_are_crossed(drawings: dict[str, Figure], demos: Demos) -> None
 def test_equal_numbers_give_equal_bytes(
     kind: str, drawings: dict[str, Figure], demos: Demos, tmp_path: Path
 ) -> None:
-    """Drawing and saving again gives the same PNG and SVG, whatever the caller's settings are."""
+    """Drawing and saving again gives the same PNG and SVG, whatever the caller's conditions are."""
     once = [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / "a")]
     with mpl.rc_context({"font.size": 20, "axes.facecolor": "black", "lines.linewidth": 9}):
         again = field_figure(FIELD) if kind == "field" else soccer_demos_figure(demos)
@@ -201,7 +202,7 @@ def test_moving_titles_tell_the_end(demos: Demos, tmp_path: Path) -> None:
     """Each title shows time and decision, and at last why the episode ends or is cut."""
     right = demos.correct[0].actions.tolist()
     pinned = [BACKWARD] * 9  # against the wall: it stays in its cell until the time is up
-    cells = SoccerField(soccer.SoccerParams(macro="cell", time_limit=60.0))
+    cells = SoccerField(rules.SoccerParams(macro="cell", time_limit=60.0))
     shown = animate(FIELD, {"a": [*right, LEFT], "b": [LEFT] * 2, "c": [LEFT] * 99}, decisions=16)
     late = animate(cells, {"d": pinned})
     assert shown.figure.axes[2].get_title(loc="left") == "c\n0.0 s, decision 0"

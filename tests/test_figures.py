@@ -9,7 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from replication import Demos, Params, fit
-from replication.figures import (
+from replication.envs.maze import as_maze
+from replication.report.figures import (
     Counts,
     Curves,
     error_figure,
@@ -50,7 +51,7 @@ SAVED = pd.DataFrame(
 @pytest.fixture(scope="module")
 def drawings(small_demos: Demos) -> dict[str, Figure]:
     """Draw each kind of figure once."""
-    maze = small_demos.maze
+    maze = as_maze(small_demos.environment)
     result = fit(small_demos, params=Params.of(incorrect="all", episodes=200, horizon=50), seed=1)
     return {
         "maze": maze_figure(small_demos),
@@ -111,7 +112,7 @@ def test_iterations_are_drawn_as_given(drawings: dict[str, Figure]) -> None:
 
 
 def test_caller_style_does_not_matter(small_demos: Demos, tmp_path: Path) -> None:
-    """A user's own matplotlib settings do not change a figure."""
+    """A user's own matplotlib conditions do not change a figure."""
     (before, _) = save_figure(maze_figure(small_demos), tmp_path / "before")
     with mpl.rc_context({"font.size": 20, "axes.facecolor": "black", "savefig.dpi": 30}):
         (after, _) = save_figure(maze_figure(small_demos), tmp_path / "after")

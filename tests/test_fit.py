@@ -8,9 +8,9 @@ import pytest
 
 from replication import Demos, Fit, Params, fit
 from replication.fit import FitError
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import run_trials
+from replication.trials.condition import Condition
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 FEW = Params.of(incorrect="all", episodes=300, horizon=50)
 
@@ -31,8 +31,8 @@ def test_fit_repeats_the_demonstration(fitted: Fit) -> None:
 
 def test_fit_is_trial_0_of_the_same_root(fitted: Fit, small_demos: Demos, store_path: Path) -> None:
     """The front door and the batch compute the same bits."""
-    setting = Setting(small_demos, "unified-incorrect", FEW)
-    trial = run_trials([setting], trials=1, store=Store(store_path), seed=3).trial(setting, 0)
+    condition = Condition(small_demos, "unified-incorrect", FEW)
+    trial = run_trials([condition], trials=1, store=Store(store_path), seed=3).trial(condition, 0)
     np.testing.assert_array_equal(fitted.weights, trial.weights)
     np.testing.assert_array_equal(fitted.q, trial.q)
     np.testing.assert_array_equal(fitted.errors, trial.errors)

@@ -6,22 +6,22 @@ from pathlib import Path
 
 import pytest
 
-from replication import kernel
+from replication.learning import compiled
 
 
 def test_no_trial_is_left_out_by_the_schedule() -> None:
     """Groups are at most two, each has a trial of its own, and only a few run one by one."""
     for live in range(200):
-        groups = kernel.count_groups(live)
+        groups = compiled.count_groups(live)
         assert 0 <= groups <= 2
-        assert groups == 0 or live >= (groups - 1) * kernel.LANES + kernel.WORTHWHILE
-        assert groups > 0 or live < kernel.WORTHWHILE
+        assert groups == 0 or live >= (groups - 1) * compiled.LANES + compiled.WORTHWHILE
+        assert groups > 0 or live < compiled.WORTHWHILE
 
 
 @pytest.mark.parametrize("writable", ["package", "user", "nothing"])
 def test_compiles_wherever_it_can_or_cannot_write(tmp_path: Path, writable: str) -> None:
     """Compiled code is kept beside the package, or else in the user's folder, or else nowhere."""
-    module = Path(shutil.copy(kernel.__file__, tmp_path))
+    module = Path(shutil.copy(compiled.__file__, tmp_path))
     home = tmp_path / "home"
     # A file where a folder should be stops even an administrator from writing there.
     if writable != "package":

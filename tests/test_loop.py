@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from replication import Demos
-from replication.expectations import feature_expectations
 from replication.irl import Trial, get_method, iterate, run
-from replication.params import Params
-from replication.setting import Setting
-from replication.tasks import Episode
+from replication.irl.agent import Episode
+from replication.irl.expectations import feature_expectations
+from replication.paper.params import Params
+from replication.trials.condition import Condition
 
 Array = NDArray[np.float64]
 GAMMA = 0.9
@@ -24,7 +24,7 @@ class Corridor:
     """Five cells in a row, solved exactly; it counts its calls."""
 
     shape: tuple[int, int] = (5, 2)
-    together: int = 1
+    batch_size: int = 1
     calls: int = 0
 
     def learn(
@@ -100,9 +100,11 @@ def test_errors_follow_from_the_episodes(method: str, cap: int) -> None:
 
 def test_values_are_those_of_q_on_the_experts_path(small_demos: Demos) -> None:
     """Row i of the values is max_a Q after i updates where the expert acts, by state, rounded."""
-    setting = Setting(small_demos, "unified", Params.of(episodes=60, horizon=40, max_iterations=9))
-    loop = setting.trial(seed=np.random.SeedSequence(1), keep=True)
-    ((_, trial),) = run(setting.task, [loop])
+    condition = Condition(
+        small_demos, "unified", Params.of(episodes=60, horizon=40, max_iterations=9)
+    )
+    loop = condition.trial(seed=np.random.SeedSequence(1), keep=True)
+    ((_, trial),) = run(condition.agent, [loop])
     assert trial.snapshots is not None
     path = sorted(small_demos.correct[0].states[:-1].tolist())
     assert path != small_demos.correct[0].states[:-1].tolist()

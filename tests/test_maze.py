@@ -13,7 +13,8 @@ from gymnasium.utils.env_checker import check_env
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from replication.envs import ACTIONS, Maze, MazeEnv, MazeError
+from replication.envs.gym import MazeEnv
+from replication.envs.maze import ACTIONS, Maze, MazeError
 
 ROWS = ("...#G", ".#...", "S..#.")  # not square
 CORRIDOR = ("S...G",)

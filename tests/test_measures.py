@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from replication import Demos, Params, load_demos
-from replication.comparisons import EXPERIMENTS, method_settings
+from replication.envs.maze import as_maze
+from replication.evidence.experiments import EXPERIMENTS, method_conditions
+from replication.files import resolve
 from replication.irl import Trial
-from replication.measures import (
+from replication.irl.agent import Episode
+from replication.trials.condition import Condition
+from replication.trials.measures import (
+    Report,
     early_errors,
     early_iterations,
     marked_pairs,
@@ -22,12 +27,9 @@ from replication.measures import (
     shown_demos,
     slope,
 )
-from replication.params import Report
-from replication.paths import resolve
-from replication.setting import Setting
-from replication.store import Store
-from replication.tasks import Episode
-from replication.trials import Results, run_trials
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 FEW = {"episodes": 100, "horizon": 40}
 NAMES = ["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
@@ -91,8 +93,8 @@ def test_early_errors_by_hand() -> None:
 
 def test_without_marked_pairs_only_hits_count(small_demos: Demos, results: Results) -> None:
     """Identity: with nothing marked, the measure is the number of hits in the trajectories."""
-    for setting in results.settings:
-        trial = results.trial(setting, 1)
+    for condition in results.conditions:
+        trial = results.trial(condition, 1)
         nothing = np.zeros(trial.weights.shape, dtype=bool)
         due = sum(int(one.hits.sum()) for one in trial.episodes[1:11])
         assert early_errors(trial, nothing, 10) == due
@@ -119,13 +121,13 @@ def test_marked_pairs_are_those_of_no_correct_demonstration(small_demos: Demos) 
 def test_every_method_is_measured_by_the_same_pairs(small_demos: Demos) -> None:
     """The method that is not shown incorrect demonstrations has its motions counted by them."""
     for kinds in ("hit+detour", "hit"):
-        settings = method_settings(small_demos, {**FEW, "incorrect": kinds}).values()
-        assert {setting.selected.incorrect for setting in settings} == {
+        conditions = method_conditions(small_demos, {**FEW, "incorrect": kinds}).values()
+        assert {condition.selected.incorrect for condition in conditions} == {
             (),
             small_demos.select(kinds).incorrect,
         }
-        for setting in settings:
-            assert shown_demos(setting) == small_demos.select(kinds)
+        for condition in conditions:
+            assert shown_demos(condition) == small_demos.select(kinds)
 
 
 def test_initial_phase_is_the_first_quarter() -> None:
@@ -201,7 +203,7 @@ def test_growth_is_from_the_mid_term(small_demos: Demos, mid_term: float, middle
 
 def test_states_that_other_demonstrations_add_are_left_out(small_demos: Demos) -> None:
     """With two correct demonstrations the values of the first one's path are the measured ones."""
-    maze, first = small_demos.maze, small_demos.correct[0]
+    maze, first = as_maze(small_demos.environment), small_demos.correct[0]
     turned = np.array([*[0] * 3, *[2] * 4])
     other = replace(first, name="other", actions=turned, states=maze.replay(turned.tolist()))
     both = replace(small_demos, correct=(first, other))
@@ -226,31 +228,31 @@ def test_trial_at_the_cap_is_told(small_demos: Demos) -> None:
 @pytest.fixture(scope="module")
 def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Results:
     """Run a few trials of every method."""
-    settings = list(method_settings(small_demos, FEW).values())
+    conditions = list(method_conditions(small_demos, FEW).values())
     store = Store(tmp_path_factory.mktemp("measures") / "trials.sqlite")
-    return run_trials(settings, trials=3, store=store, seed=2)
+    return run_trials(conditions, trials=3, store=store, seed=2)
 
 
 def test_there_is_a_row_for_each_trial_and_method(small_demos: Demos, results: Results) -> None:
     """Rows are keyed by task, method, reading of Eq. 9 and trial; AdaBoost-IRL has no reading."""
-    settings = method_settings(small_demos, FEW)
-    table = measure_trials(results, settings)
+    conditions = method_conditions(small_demos, FEW)
+    table = measure_trials(results, conditions)
     assert table.columns.tolist() == ["task", "method", "F", "trial", *NAMES]
-    due = [("small", method, f, k) for method, f in settings for k in range(3)]
+    due = [("small", method, f, k) for method, f in conditions for k in range(3)]
     keys = table[["task", "method", "F", "trial"]].itertuples(index=False, name=None)
     assert list(keys) == due
-    for (method, f), setting in settings.items():
+    for (method, f), condition in conditions.items():
         own = table[(table["method"] == method) & (table["F"] == f)]
-        assert own["iterations"].tolist() == results.iterations(setting).tolist()
-        assert own["converged"].tolist() == results.converged(setting).astype(int).tolist()
+        assert own["iterations"].tolist() == results.iterations(condition).tolist()
+        assert own["converged"].tolist() == results.converged(condition).astype(int).tolist()
     assert set(table[table["method"] == "adaboost"]["F"]) == {""}
 
 
 def test_report_reaches_every_trial(small_demos: Demos, results: Results) -> None:
     """A longer initial phase has no fewer errors, and the growth is from the given mid-term."""
-    settings = method_settings(small_demos, FEW)
+    conditions = method_conditions(small_demos, FEW)
     usual, other = (
-        measure_trials(results, settings, report)
+        measure_trials(results, conditions, report)
         for report in (None, Report(early=0.5, mid_term=0.75))
     )
     assert (other["early_errors"] >= usual["early_errors"]).all()
@@ -261,8 +263,8 @@ def test_report_reaches_every_trial(small_demos: Demos, results: Results) -> Non
 
 def test_setting_without_demonstrations_counts_hits(small_demos: Demos, results: Results) -> None:
     """Where no incorrect demonstrations are chosen, the measured errors are hits alone."""
-    setting = Setting(small_demos, "unified", Params.of(**FEW, incorrect="none"))
-    own = measure_trials(results, {("unified", "printed"): setting})
+    condition = Condition(small_demos, "unified", Params.of(**FEW, incorrect="none"))
+    own = measure_trials(results, {("unified", "printed"): condition})
     for k, errors in enumerate(own["early_errors"]):
-        episodes = results.trial(setting, k).episodes[1:11]
+        episodes = results.trial(condition, k).episodes[1:11]
         assert errors == sum(int(one.hits.sum()) for one in episodes)

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from replication import METHODS
-from replication.choices import ChoiceError
 from replication.irl import get_method
+from replication.paper.register import ChoiceError
 
 
 def test_names_are_keys_and_labels_are_distinct() -> None:

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from replication import Demos, Params
-from replication.comparisons import method_settings
-from replication.figures import Counts, Curves
-from replication.panels import (
+from replication.envs.maze import as_maze
+from replication.evidence.experiments import method_conditions
+from replication.report.figures import Counts, Curves
+from replication.report.panels import (
     demo_numbers,
     describe_demos,
     describe_errors,
@@ -24,10 +25,12 @@ from replication.panels import (
     surface_numbers,
     surfaces,
 )
-from replication.params import Report
-from replication.setting import Setting
-from replication.store import Store
-from replication.trials import TRACED_TRIAL, Results, run_trials
+from replication.trials.compute import TRACED_TRIAL
+from replication.trials.condition import Condition
+from replication.trials.measures import Report
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 FEW = {"episodes": 100, "horizon": 40}
 
@@ -36,42 +39,42 @@ FEW = {"episodes": 100, "horizon": 40}
 def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Results:
     """Run a few trials of every method."""
     store = Store(tmp_path_factory.mktemp("panels") / "trials.sqlite")
-    settings = list(method_settings(small_demos, FEW).values())
-    return run_trials(settings, trials=4, store=store, seed=2)
+    conditions = list(method_conditions(small_demos, FEW).values())
+    return run_trials(conditions, trials=4, store=store, seed=2)
 
 
 def test_panels_hold_the_trials_of_their_reading(small_demos: Demos, results: Results) -> None:
     """Each panel has the curves and counts of one reading; AdaBoost-IRL stands in both."""
-    settings = method_settings(small_demos, FEW)
+    conditions = method_conditions(small_demos, FEW)
     names = ["adaboost", "unified"]
-    errors = error_panels(results, settings, names, {"unified": 47})
-    counts = iteration_panels(results, settings, names, {"unified": 40.1})
+    errors = error_panels(results, conditions, names, {"unified": 47})
+    counts = iteration_panels(results, conditions, names, {"unified": 40.1})
     for (f, curves), numbers in zip(errors.items(), counts.values(), strict=True):
         reading = "printed" if "printed" in f else "updated"
         keys = [("adaboost", ""), ("unified", reading)]
         for key, one, count in zip(keys, curves, numbers, strict=True):
-            np.testing.assert_array_equal(one.errors, results.errors(settings[key]))
-            np.testing.assert_array_equal(count.iterations, results.iterations(settings[key]))
+            np.testing.assert_array_equal(one.errors, results.errors(conditions[key]))
+            np.testing.assert_array_equal(count.iterations, results.iterations(conditions[key]))
         assert [one.published for one in curves] == [None, 47]
         assert [one.published for one in numbers] == [None, 40.1]
 
 
 def test_numbers_are_what_is_drawn(small_demos: Demos, results: Results) -> None:
     """The stored numbers have a row for each point, and the median lies between the quartiles."""
-    settings = method_settings(small_demos, FEW)
-    errors = error_panels(results, settings, ["unified"], {})
+    conditions = method_conditions(small_demos, FEW)
+    errors = error_panels(results, conditions, ["unified"], {})
     table = error_numbers(errors)
     assert len(table) == sum(one.errors.shape[1] for each in errors.values() for one in each)
     assert (table["quartile_1"] <= table["median"]).all()
     assert (table["median"] <= table["quartile_3"]).all()
-    counts = iteration_panels(results, settings, ["unified"], {})
+    counts = iteration_panels(results, conditions, ["unified"], {})
     assert len(iteration_numbers(counts)) == 2 * results.trials
 
 
 def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, results: Results) -> None:
     """Fig. 7: the best or mean action of Q half-way, Q at the end, and the reward at the end."""
-    setting = Setting(small_demos, "unified", Params.of(**FEW))
-    trial = results.trial(setting, TRACED_TRIAL, snapshots=True)
+    condition = Condition(small_demos, "unified", Params.of(**FEW))
+    trial = results.trial(condition, TRACED_TRIAL, snapshots=True)
     assert trial.snapshots is not None
     best = list(surfaces(trial, Report()).values())
     middle = round(trial.iterations / 2)
@@ -84,7 +87,7 @@ def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, results: Res
 
 def test_cells_count_from_the_lower_left(small_demos: Demos) -> None:
     """In the numbers, as in the figures, x goes right and y goes up; obstacles are left out."""
-    maze = small_demos.maze
+    maze = as_maze(small_demos.environment)
     table = surface_numbers(maze, {"state": np.arange(maze.n_states, dtype=float)})
     assert len(table) == maze.free.sum()
     start = table[table["state"] == maze.start].iloc[0]
@@ -132,8 +135,8 @@ def test_descriptions_say_the_finding(small_demos: Demos) -> None:
 
 def test_outputs_show_what_they_write(tmp_path: Path, small_demos: Demos) -> None:
     """A figure comes with its numbers and an alternative text, a table with its full precision."""
-    from replication.figures import maze_figure
-    from replication.outputs import Outputs
+    from replication.report.figures import maze_figure
+    from replication.report.outputs import Outputs
 
     shown = Outputs(tmp_path / "out")
     image = shown.figure(

@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
-from replication.choices import Choice, ChoiceError, Chosen, Value, register
-from replication.params import Demonstrations, Expert, Learner, Loop, Params, Report, Update
+from replication.demos.maze_expert import Expert
+from replication.paper.params import Demonstrations, Learner, Loop, Params, Update
+from replication.paper.register import Choice, ChoiceError, Chosen, Value, load_choices
+from replication.trials.measures import Report
 
 KINDS: tuple[type[Chosen], ...] = (Demonstrations, Learner, Loop, Update, Expert, Report)
 FIELDS = [
-    (kind, field.name, register()[field.metadata["choice"]])
+    (kind, field.name, load_choices()[field.metadata["choice"]])
     for kind in KINDS
     for field in dataclasses.fields(kind)  # type: ignore[arg-type] # they are dataclasses
 ]

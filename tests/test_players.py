@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from replication import Demos
-from replication.comparisons import Key
-from replication.envs.field import SoccerField
-from replication.field_figures import animate
+from replication.demos.soccer_expert import demonstrate_soccer
+from replication.envs.maze import as_maze
+from replication.envs.soccer.field import SoccerField
+from replication.evidence.experiments import Key
 from replication.irl import Trial
-from replication.paper import SOCCER
-from replication.params import Params
-from replication.players import (
+from replication.paper.params import Params
+from replication.paper.published import SOCCER
+from replication.report.field_figures import animate
+from replication.report.players import (
     MOST_FRAMES,
     Course,
     course_numbers,
@@ -26,24 +28,23 @@ from replication.players import (
     learning_player,
     player,
 )
-from replication.setting import Setting
-from replication.soccer_expert import demonstrate_soccer
-from replication.store import Store
-from replication.trials import run_trials
+from replication.trials.condition import Condition
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 FRAME = re.compile(r'data:image/png;base64,([^"]*)')
 
 
 def learned(demos: Demos, folder: Path, **choices: object) -> dict[Key, Trial]:
     """Let two methods learn, keeping every iteration."""
-    settings = {
-        (name, f): Setting(demos, name, Params.of(**choices))
+    conditions = {
+        (name, f): Condition(demos, name, Params.of(**choices))
         for name, f in (("adaboost", ""), ("unified", "printed"))
     }
     results = run_trials(
-        list(settings.values()), trials=1, store=Store(folder / "trials.sqlite"), seed=3
+        list(conditions.values()), trials=1, store=Store(folder / "trials.sqlite"), seed=3
     )
-    return {key: results.trial(one, 0, snapshots=True) for key, one in settings.items()}
+    return {key: results.trial(one, 0, snapshots=True) for key, one in conditions.items()}
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_courses_are_the_trials(small_demos: Demos, shown: list[Course], tmp_pat
 
 def test_the_last_way_is_the_experts(small_demos: Demos, shown: list[Course]) -> None:
     """A trial that converged ends on the expert's way, from the start to the goal."""
-    maze = small_demos.maze
+    maze = as_maze(small_demos.environment)
     for one in shown:
         assert one.errors[-1] == 0
         x, y = one.ways[-1][-1]

@@ -9,12 +9,20 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import paths, provenance
-from replication.notebooks import Notebook, NotebookError, read_notebook
-from replication.provenance import Inputs, changes, damaged, inputs_of, read_manifest, record
+from replication import files
+from replication.pipeline import provenance
+from replication.pipeline.notebook import Notebook, NotebookError, read_notebook
+from replication.pipeline.provenance import (
+    Inputs,
+    changes,
+    damaged,
+    inputs_of,
+    read_manifest,
+    record,
+)
 
 PARAMETERS = 'trials = 3\ndemos = "demos.json"\njobs = 1\nstore = "s"\nout = "build"'
-CODE = "from replication.seeds import trial_seeds\nvalue = trials  # as given"
+CODE = "from replication.learning.seeds import trial_seeds\nvalue = trials  # as given"
 
 Write = Callable[..., Notebook]
 
@@ -22,7 +30,7 @@ Write = Callable[..., Notebook]
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with a lock, a data file of each format, and no notebook."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "environment.lock").write_text("numpy==1\n")
     (tmp_path / "choices.toml").write_text("a = 1\nb = 2\n")
@@ -64,7 +72,7 @@ def test_prose_comments_and_layout_do_not_count(write: Write, project: Path) -> 
     """A reader's text, and how code and data are laid out, leave the inputs as they are."""
     before = inputs_of(write(), {})
     notebook = write(
-        '"""Why."""\nfrom replication.seeds import trial_seeds  # the seeds\n\nvalue = (trials)',
+        '"""Why."""\nfrom replication.learning.seeds import trial_seeds  # the seeds\n\nvalue = (trials)',
         prose="# Another headline",
         parameters=f"# So many:\n{PARAMETERS}  # a folder",
     )
@@ -134,22 +142,24 @@ def test_what_counts_is_named(
 def test_a_change_of_a_module_is_named(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     """The hash of each module that the cells import, directly or not, is part of the inputs."""
     before = inputs_of(write(), {})
-    assert list(before["source"]) == ["replication.seeds"]
-    now = inputs_of(write("import replication.tables\nfrom numpy import pi"), {})
-    assert {"replication.tables", "replication.statistics"} <= set(now["source"])
+    assert list(before["source"]) == ["replication.learning.seeds"]
+    now = inputs_of(write("import replication.evidence.tables\nfrom numpy import pi"), {})
+    assert {"replication.evidence.tables", "replication.evidence.statistics"} <= set(now["source"])
     assert all(name.startswith("replication") for name in now["source"])
-    edited = before | {"source": {"replication.seeds": "0" * 16}}
-    assert changes(known(before), edited) == ["replication.seeds has changed"]
+    edited = before | {"source": {"replication.learning.seeds": "0" * 16}}
+    assert changes(known(before), edited) == ["replication.learning.seeds has changed"]
 
 
 def test_code_that_python_cannot_read_has_inputs(write: Write) -> None:
     """Magics and faults are left to the run, and what stands beside magics still counts."""
     first, second = (inputs_of(write(CODE, line), {}) for line in ("%time x", "%time y"))
     assert changes(known(first), second) == ["the notebook's code has changed"]
-    assert list(first["source"]) == ["replication.seeds"]
-    beside = write("%%time\n%matplotlib inline\n!ls\nfrom replication.seeds import trial_seeds")
-    assert list(inputs_of(beside, {})["source"]) == ["replication.seeds"]
-    assert inputs_of(write("from replication.seeds import ("), {})["source"] == {}
+    assert list(first["source"]) == ["replication.learning.seeds"]
+    beside = write(
+        "%%time\n%matplotlib inline\n!ls\nfrom replication.learning.seeds import trial_seeds"
+    )
+    assert list(inputs_of(beside, {})["source"]) == ["replication.learning.seeds"]
+    assert inputs_of(write("from replication.learning.seeds import ("), {})["source"] == {}
 
 
 def test_cells_are_told_apart(write: Write) -> None:

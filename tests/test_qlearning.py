@@ -8,7 +8,8 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 from scipy import stats
 
-from replication import qlearning, reference
+from replication.learning import qlearning, reference
+from replication.learning.seeds import stream
 
 Array = NDArray[Any]
 
@@ -28,7 +29,7 @@ def grid(rows: int, columns: int, obstacles: tuple[int, ...] = ()) -> Array:
 def make_streams(seed: int, trials: int) -> Array:
     """Return the streams of some trials."""
     seeds = np.random.SeedSequence(seed).spawn(trials)
-    return np.array([qlearning.stream(s) for s in seeds], np.uint64).reshape(trials, 4)
+    return np.array([stream(s) for s in seeds], np.uint64).reshape(trials, 4)
 
 
 def same_bits(a: Array, b: Array) -> bool:
@@ -303,9 +304,9 @@ def test_roll_out_follows_the_greedy_policy(
     """A roll-out is the reference's, greedy, obeys the transitions, and ends where it must."""
     (next_state, _, q, streams), options = problem
     task = {name: options[name] for name in ("start", "goal", "horizon", "random_ties")}
-    for values, stream in zip(q[:2], streams[:2], strict=True):
-        states, actions, after = qlearning.roll_out(next_state, values, stream, **task)
-        expected = reference.roll_out(next_state.tolist(), values.tolist(), stream.tolist(), **task)
+    for values, words in zip(q[:2], streams[:2], strict=True):
+        states, actions, after = qlearning.roll_out(next_state, values, words, **task)
+        expected = reference.roll_out(next_state.tolist(), values.tolist(), words.tolist(), **task)
         assert (states.tolist(), actions.tolist(), after.tolist()) == expected
         assert states[0] == task["start"]
         assert (states[1:] == next_state[states[:-1], actions]).all()
@@ -328,7 +329,7 @@ def test_stream_is_never_all_zero() -> None:
         def generate_state(self, n_words: int, dtype: Any = np.uint32) -> Array:
             return np.zeros(n_words, dtype)
 
-    assert qlearning.stream(Zeros(0)).any()
+    assert stream(Zeros(0)).any()
     streams = make_streams(0, 100)
     assert len(np.unique(streams)) == streams.size
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pandas as pd
 
 from replication import check_demos, fit, load_demos
-from replication.claims import claims
-from replication.paths import PROJECT
-from replication.tables import read_table
+from replication.envs.maze import as_maze
+from replication.evidence.claims import load_claims
+from replication.evidence.tables import read_table
+from replication.files import PROJECT
 
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
 
@@ -50,7 +51,7 @@ def test_every_trial_of_the_unified_method_reaches_zero() -> None:
 def test_baseline_is_said_to_contradict_the_paper_where_it_does() -> None:
     """R1 alone has a mean whose interval holds the published one; only one SD test rejects."""
     rules = read("ablations").set_index("setting")
-    paper = claims().by_id("FASTER").paper["adaboost"][0]
+    paper = load_claims().by_id("FASTER").paper["adaboost"][0]
     for rule, fits in (("mismatch", True), ("confidence", False), ("log-odds", False)):
         one = rules.loc[f"AdaBoost-IRL, {rule}"]
         assert (one["low"] <= paper <= one["high"]) == fits
@@ -58,7 +59,7 @@ def test_baseline_is_said_to_contradict_the_paper_where_it_does() -> None:
     graded = rules.loc["AdaBoost-IRL, graded"]
     assert graded["capped"] == graded["n"]
     assert (judged("FASTER")["high"] < 0).all()
-    assert (judged("STEADIER")["p_holm"] < claims().judging.level).tolist() == [False, True]
+    assert (judged("STEADIER")["p_holm"] < load_claims().judging.level).tolist() == [False, True]
     effects = read("sensitivity_factorial")
     graded = effects[effects["specification"].str.endswith("ADABOOST-RULE=graded")]
     assert (graded[graded["claim"] == "FASTER"]["capped"] == 10).all()
@@ -98,7 +99,7 @@ def test_q_is_said_to_fall_and_the_reward_to_have_no_trend() -> None:
     assert (slopes.mean().abs() < slopes.std()).all()
     surface = read("fig07")
     highest = surface.loc[surface["(c) reward at the end"].idxmax()]
-    maze = load_demos(PROJECT / "data" / "demos" / "open_maze.json").maze
+    maze = as_maze(load_demos(PROJECT / "data" / "demos" / "open_maze.json").environment)
     row, column = divmod(maze.goal, 20)
     assert abs(highest["x"] - column) + abs(highest["y"] - (19 - row)) == 1
 

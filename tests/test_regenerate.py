@@ -19,13 +19,17 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import Demos, claims, execution, paths, provenance, specifications
+from replication import Demos
+from replication import files as project_files
+from replication.envs.maze import as_maze
+from replication.evidence import claims, specifications
 from replication.files import write_file
-from replication.folders import executed_folder
-from replication.freshness import read_runs
-from replication.notebooks import Notebook, NotebookError, RunError
-from replication.regenerate import run_notebooks
-from replication.verification import verify_outputs
+from replication.pipeline import execute, provenance
+from replication.pipeline.folders import executed_folder
+from replication.pipeline.freshness import read_runs
+from replication.pipeline.notebook import Notebook, NotebookError, RunError
+from replication.pipeline.run import run_notebooks
+from replication.pipeline.verify import verify_outputs
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
@@ -171,7 +175,7 @@ def test_quick_results_never_go_to_figures(
     write: Write, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only the profile `paper` may write to the project's figures, by whatever path."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(project_files, "PROJECT", tmp_path)
     (tmp_path / "link").symlink_to(tmp_path / "figures")
     (tmp_path / "environment.lock").touch()
     for folder in ("figures", "figures/../figures", "link", "figures/below"):
@@ -183,7 +187,7 @@ def test_changed_results_never_go_to_figures(
     write: Write, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What changes no result may be set in a run into the figures, anything else may not."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(project_files, "PROJECT", tmp_path)
     (tmp_path / "environment.lock").touch()
     path = write("(folder / 'a').touch()", outputs=["a"], parameters=f"{PARAMETERS}\nstore = ''")
     published = run(path, parameters={"store": "x", "jobs": 1})
@@ -210,7 +214,7 @@ def test_run_publishes_what_is_declared(
 
     A foreign kernel of the same name, and the user's start-up files, take no part.
     """
-    foreign = tmp_path / "jupyter" / "kernels" / execution.KERNEL
+    foreign = tmp_path / "jupyter" / "kernels" / execute.KERNEL
     foreign.mkdir(parents=True)
     spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
     (foreign / "kernel.json").write_text(json.dumps(spec))
@@ -306,7 +310,7 @@ def test_failure_leaves_earlier_outputs(
     assert ("KeyError" in caught.value.details) == ("KeyError" in code)
 
 
-@pytest.mark.parametrize("ename", sorted(execution.MISTAKES))
+@pytest.mark.parametrize("ename", sorted(execute.MISTAKES))
 def test_refusal_in_a_cell_is_the_users_mistake(
     write: Write, run: Run, tmp_path: Path, ename: str
 ) -> None:
@@ -328,7 +332,7 @@ def test_refusal_in_a_cell_is_the_users_mistake(
 
 def test_missing_kind_comes_with_a_mend(write: Write, run: Run, small_demos: Demos) -> None:
     """The option that takes the kinds of a file is shown, beside the choices that were made."""
-    code = f"Demos('t', Maze({small_demos.maze.rows!r}), [Demo('c', 'correct', "
+    code = f"Demos('t', Maze({as_maze(small_demos.environment).rows!r}), [Demo('c', 'correct', "
     correct = small_demos.correct[0]
     code += f"{correct.states.tolist()}, {correct.actions.tolist()})]).select('hit')"
     path = write("from replication import Demo, Demos, Maze", code)
@@ -373,7 +377,7 @@ def test_only_the_start_of_a_kernel_is_tried_again(
     begun[:] = [False] * 2
     with pytest.raises(RunError, match="the kernel does not start: Kernel died"):
         run(write())
-    assert len(begun) == 2 + execution.STARTS
+    assert len(begun) == 2 + execute.STARTS
 
 
 def test_publishing_is_all_or_nothing(
@@ -400,7 +404,7 @@ def test_folders_of_outputs_do_not_share_executed_notebooks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The default folders have theirs below `build`, every other folder has its own."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(project_files, "PROJECT", tmp_path)
     folders = {
         ("figures", "paper"): "build/executed/paper",
         ("build/quick", "quick"): "build/executed/quick",
@@ -435,14 +439,14 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
                 names |= {**values, "out": str(stage)}
         write_file(executed, str(nbformat.writes(node)))
 
-    monkeypatch.setattr(execution, "execute", execute)
+    monkeypatch.setattr(execute, "execute", execute)
     return begun
 
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with a lock and a data file."""
-    monkeypatch.setattr(paths, "PROJECT", tmp_path)
+    monkeypatch.setattr(project_files, "PROJECT", tmp_path)
     (tmp_path / "environment.lock").write_text("numpy==1")
     (tmp_path / "data.toml").write_text("a = 1")
     return tmp_path
@@ -743,14 +747,14 @@ def test_rows_that_were_lost_are_made_again(
         write(append, name=name, parameters=f'out = "x"\nname = "{name}"', merged=["rows.csv"])
         for name in ("one", "two", "three")
     ]
-    run(*paths, jobs=None)
+    run(*files, jobs=None)
     (project / "figures" / "rows.csv").unlink()
     run(paths[0], jobs=None)
     begun.clear()
-    run(*paths, jobs=None)
+    run(*files, jobs=None)
     assert begun == ["two", "three"]
     assert (project / "figures" / "rows.csv").read_text() == "one three two"
-    run(*paths, jobs=None)
+    run(*files, jobs=None)
     assert begun == ["two", "three"]
 
 
@@ -760,7 +764,7 @@ def test_an_edit_during_the_run_publishes_nothing(
 ) -> None:
     """Nobody knows whether outputs were made before or after an edit: they are made again."""
     edit = f"(PROJECT / {file!r}).write_text('b = 2')\nvalue = 1"
-    path = toy(write, f"from replication.paths import PROJECT\n{edit}")
+    path = toy(write, f"from replication.files import PROJECT\n{edit}")
     with pytest.raises(RunError, match=rf"{re.escape(file)} has changed during the run: nothing"):
         run(path)
     assert files(project / "figures") == []
@@ -773,7 +777,7 @@ def test_an_edit_during_an_earlier_notebook_counts(
     write: Write, run: Run, project: Path, begun: list[str]
 ) -> None:
     """What a notebook depends on is what was there when it began, not when the command did."""
-    edit = "from replication.paths import PROJECT\n(PROJECT / 'data.toml').write_text('b = 2')"
+    edit = "from replication.files import PROJECT\n(PROJECT / 'data.toml').write_text('b = 2')"
     first = write(edit, name="first", parameters=STORED)
     second = toy(write)
     run(first, second)

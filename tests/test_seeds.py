@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from replication.seeds import child, trial_seeds
+from replication.learning.seeds import child, trial_seeds
 
 ROOTS = st.integers(0, 2**64)
 

@@ -10,11 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from replication import Demos
-from replication.claims import Claim, claims
-from replication.comparisons import method_settings
-from replication.measures import measure_trials
-from replication.paths import PROJECT
-from replication.sensitivity import (
+from replication.evidence.claims import Claim, load_claims
+from replication.evidence.experiments import method_conditions
+from replication.evidence.sensitivity import (
     HOLDS,
     NAMES,
     OPEN,
@@ -33,12 +31,19 @@ from replication.sensitivity import (
     unchanged,
     variance_shares,
 )
-from replication.setting import Setting
-from replication.specifications import Specification, declared, factorial_specifications
-from replication.statistics import mean_intervals, sd_ratio_intervals, share_interval
-from replication.store import Store
-from replication.tables import pairs_near, read_table
-from replication.trials import Results, run_trials
+from replication.evidence.specifications import (
+    Specification,
+    factorial_specifications,
+    load_specifications,
+)
+from replication.evidence.statistics import mean_intervals, sd_ratio_intervals, share_interval
+from replication.evidence.tables import pairs_near, read_table
+from replication.files import PROJECT
+from replication.trials.condition import Condition
+from replication.trials.measures import measure_trials
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 FEW = {"episodes": 100, "horizon": 40}
 CHOICES: dict[str, tuple[Any, ...]] = {
@@ -106,14 +111,14 @@ def effects(
 )
 def test_outcome_by_hand(id: str, effect: float, low: float, high: float, due: str) -> None:
     """The whole interval lies beyond the margin; a share holds where it is itself above it."""
-    assert _outcome(claims().by_id(id), effect, low, high) == due
+    assert _outcome(load_claims().by_id(id), effect, low, high) == due
 
 
 def test_effects_of_many_rows_are_those_of_each() -> None:
     """Each statistic is computed row by row, [specification, trial]."""
     rng = np.random.default_rng(1)
     x, y = rng.normal(36, 4, (4, 12)), rng.normal(40, 8, (4, 12))
-    one = claims().by_id
+    one = load_claims().by_id
     found = _effects(one("FASTER"), x, y)
     np.testing.assert_array_equal(found, ((x - y).mean(axis=1), *mean_intervals(x - y)))
     np.testing.assert_array_equal(
@@ -129,7 +134,7 @@ def test_effects_of_many_rows_are_those_of_each() -> None:
 def test_published_numbers_have_no_effect_here() -> None:
     """A claim about a published number cannot be evaluated under a specification."""
     with pytest.raises(AssertionError, match="MEAN-UNIFIED-OPEN has no effect"):
-        _effects(claims().by_id("MEAN-UNIFIED-OPEN"), np.ones((1, 3)), np.ones((1, 3)))
+        _effects(load_claims().by_id("MEAN-UNIFIED-OPEN"), np.ones((1, 3)), np.ones((1, 3)))
 
 
 def test_shares_of_outcomes_by_hand() -> None:
@@ -392,7 +397,7 @@ def test_findings_say_what_one_choice_moves() -> None:
 
 def test_every_choice_of_the_factorial_has_a_name() -> None:
     """A choice that is added to the factorial has to be named in words, too."""
-    assert set(NAMES) == set(declared().mazes.factorial.choices)
+    assert set(NAMES) == set(load_specifications().mazes.factorial.choices)
 
 
 def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
@@ -417,7 +422,7 @@ def test_published_tables_follow_from_the_published_effects() -> None:
         read_table(FIGURES / f"sensitivity_{name}.csv")
         for name in ("factorial", "single", "soccer")
     )
-    made = factorial_specifications(declared().mazes.factorial)
+    made = factorial_specifications(load_specifications().mazes.factorial)
     shares = variance_shares(together, made).merge(
         variance_shares(together[together["capped"] == 0], made),
         how="left",
@@ -447,37 +452,39 @@ def test_published_effects_have_their_outcomes() -> None:
     )
     assert len(rows) == 8 * 240 + 8 * 44 + 3 * 19
     for row in rows.itertuples():
-        assert row.outcome == _outcome(claims().by_id(row.claim), row.effect, row.low, row.high)
+        assert row.outcome == _outcome(
+            load_claims().by_id(row.claim), row.effect, row.low, row.high
+        )
 
 
 # --- tiny runs -------------------------------------------------------------------------------
 
-Run = tuple[Results, dict[Specification, dict[tuple[str, str], Setting]]]
+Run = tuple[Results, dict[Specification, dict[tuple[str, str], Condition]]]
 
 
 @pytest.fixture(scope="module")
 def tiny(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Run two specifications, the second with a cap that most trials reach, and one method less."""
-    usual = method_settings(small_demos, FEW)
-    capped = method_settings(small_demos, {**FEW, "max_iterations": 5})
-    settings = {
+    usual = method_conditions(small_demos, FEW)
+    capped = method_conditions(small_demos, {**FEW, "max_iterations": 5})
+    conditions = {
         Specification("single", ()): {k: one for k, one in usual.items() if k[1] != "updated"},
         Specification("single", (("ITERATION-CAP", 5),)): {
             k: one for k, one in capped.items() if k[1] != "printed" and k[0] != "adaboost"
         },
     }
     store = Store(tmp_path_factory.mktemp("sensitivity") / "trials.sqlite")
-    every = [one for own in settings.values() for one in own.values()]
-    return run_trials(every, trials=6, store=store, seed=2), settings
+    every = [one for own in conditions.values() for one in own.values()]
+    return run_trials(every, trials=6, store=store, seed=2), conditions
 
 
 def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     """Effects equal the statistics of the trials; capped trials count as the cap and are told."""
-    results, settings = tiny
+    results, conditions = tiny
     wanted: list[Claim] = [
-        claims().by_id(id) for id in ("FASTER", "SAVES-OPEN", "Q-GROWS", "ZERO-OPEN")
+        load_claims().by_id(id) for id in ("FASTER", "SAVES-OPEN", "Q-GROWS", "ZERO-OPEN")
     ]
-    table = effects_table(results, settings, wanted)
+    table = effects_table(results, conditions, wanted)
     assert table.groupby("claim", sort=False).size().to_dict() == {
         "FASTER": 1,  # the second specification has no AdaBoost-IRL
         "SAVES-OPEN": 2,
@@ -486,8 +493,8 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     }
     assert set(table["n"]) == {6}
     for row in table.itertuples():
-        claim = claims().by_id(row.claim)
-        (own,) = (one for s, one in settings.items() if s.name == row.specification)
+        claim = load_claims().by_id(row.claim)
+        (own,) = (one for s, one in conditions.items() if s.name == row.specification)
         trials = measure_trials(results, own)
         x = trials[trials["method"] == claim.x]
         y = trials[trials["method"] == claim.y]
@@ -500,7 +507,7 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
         assert row.capped_x == (x["converged"] == 0).sum()
         assert row.capped == row.capped_x + (y["converged"] == 0).sum()
         assert row.outcome == _outcome(claim, row.effect, row.low, row.high)
-    second = {one: own for one, own in settings.items() if one.choices}
+    second = {one: own for one, own in conditions.items() if one.choices}
     some = effects_table(results, second, wanted)
     assert some["claim"].tolist() == ["SAVES-OPEN", "Q-GROWS"]  # none has AdaBoost-IRL
     assert table[table["specification"] == "default"]["capped"].tolist() == [0] * 4
@@ -509,15 +516,17 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
 
 def test_ablations_are_summaries_of_the_trials(tiny: Run) -> None:
     """Each row has the mean, SD and median of its own trials, and counts those at the cap."""
-    results, settings = tiny
+    results, conditions = tiny
     named = {
-        f"{n} {key[0]}": one for n, own in enumerate(settings.values()) for key, one in own.items()
+        f"{n} {key[0]}": one
+        for n, own in enumerate(conditions.values())
+        for key, one in own.items()
     }
     table = ablations_table(results, named)
     assert table["setting"].tolist() == list(named)
-    for row, setting in zip(table.itertuples(), named.values(), strict=True):
-        counts = results.iterations(setting)
-        assert (row.n, row.capped) == (6, (~results.converged(setting)).sum())
+    for row, condition in zip(table.itertuples(), named.values(), strict=True):
+        counts = results.iterations(condition)
+        assert (row.n, row.capped) == (6, (~results.converged(condition)).sum())
         assert (row.mean, row.median) == (counts.mean(), np.median(counts))
         assert row.sd == pytest.approx(counts.std(ddof=1))
         assert row.low <= row.mean <= row.high
@@ -530,23 +539,23 @@ def test_ablations_are_summaries_of_the_trials(tiny: Run) -> None:
 
 def test_numbers_save_against_none(small_demos: Demos, tiny: Run, tmp_path: Any) -> None:
     """What n incorrect demonstrations save is against none, over the same seeds and reading."""
-    usual = method_settings(small_demos, FEW)
-    settings = {
+    usual = method_conditions(small_demos, FEW)
+    conditions = {
         (n, f): usual["unified-incorrect" if n else "unified", f]
         for n in (0, 9)
         for f in ("printed", "updated")
     }
     store = Store(tmp_path / "trials.sqlite")
-    results = run_trials(list(settings.values()), trials=6, store=store, seed=2)
-    table = numbers_table(results, settings)
-    assert list(zip(table["number"], table["F"], strict=True)) == list(settings)
+    results = run_trials(list(conditions.values()), trials=6, store=store, seed=2)
+    table = numbers_table(results, conditions)
+    assert list(zip(table["number"], table["F"], strict=True)) == list(conditions)
     for row in table.itertuples():
-        counts = results.iterations(settings[row.number, row.F])
-        saved = results.iterations(settings[0, row.F]) - counts
+        counts = results.iterations(conditions[row.number, row.F])
+        saved = results.iterations(conditions[0, row.F]) - counts
         assert (row.mean, row.saved) == (counts.mean(), saved.mean())
         assert row.low <= row.mean <= row.high
         assert row.saved_low <= row.saved <= row.saved_high
-        near = pairs_near(settings[row.number, row.F].selected)
+        near = pairs_near(conditions[row.number, row.F].selected)
         assert (row.pairs, row.leaving) == (near["pairs"], near["leaving"])
     none = table[table["number"] == 0]
     assert (none[["pairs", "saved", "saved_low", "saved_high"]] == 0).all(axis=None)

@@ -3,30 +3,30 @@ from __future__ import annotations
 import pytest
 
 from replication import DemoError, Demos, Params
-from replication.choices import ChoiceError
-from replication.setting import Setting
+from replication.paper.register import ChoiceError
+from replication.trials.condition import Condition
 
 
 def test_methods_see_only_the_demonstrations_they_use(small_demos: Demos) -> None:
     """Without a use for incorrect demonstrations a method is given none; else those asked for."""
     params = Params.of(incorrect="hit+detour")
-    assert Setting(small_demos, "unified", params).selected.incorrect == ()
-    assert set(Setting(small_demos, "unified-incorrect", params).selected.kinds) == {
+    assert Condition(small_demos, "unified", params).selected.incorrect == ()
+    assert set(Condition(small_demos, "unified-incorrect", params).selected.kinds) == {
         "hit",
         "detour",
     }
 
 
 def test_unknown_method_and_absent_kind_are_refused(small_demos: Demos) -> None:
-    """A setting that could not run is refused when it is made."""
+    """A condition that could not run is refused when it is made."""
     with pytest.raises(ChoiceError, match="unknown method"):
-        Setting(small_demos, "unify", Params())
+        Condition(small_demos, "unify", Params())
     with pytest.raises(DemoError, match="detour"):
-        Setting(small_demos.select("hit"), "unified-incorrect", Params.of(incorrect="detour"))
+        Condition(small_demos.select("hit"), "unified-incorrect", Params.of(incorrect="detour"))
 
 
 def test_choices_name_what_differs_from_the_defaults(small_demos: Demos) -> None:
     """The column `choices` is empty for the defaults and lists ids and values otherwise."""
-    assert Setting(small_demos, "unified", Params()).choices == ""
+    assert Condition(small_demos, "unified", Params()).choices == ""
     params = Params.of(alpha=0.1, f_index="updated")
-    assert Setting(small_demos, "unified", params).choices == "F-INDEX=updated ALPHA=0.1"
+    assert Condition(small_demos, "unified", params).choices == "F-INDEX=updated ALPHA=0.1"

@@ -10,13 +10,13 @@ import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import execution
 from replication.files import write_file
-from replication.notebooks import Notebook, RunError
-from replication.regenerate import run_notebooks
+from replication.pipeline import execute
+from replication.pipeline.notebook import Notebook, RunError
+from replication.pipeline.run import run_notebooks
+from replication.pipeline.verify import verify_outputs
 from replication.site import build
 from replication.site.build import SiteError, build_site
-from replication.verification import verify_outputs
 
 CONF = """
 extensions = ["myst_nb"]
@@ -90,7 +90,7 @@ def test_a_failed_notebook_stops_the_build(project: Path, monkeypatch: pytest.Mo
         write_file(executed, str(nbformat.writes(notebook.load())))
         raise RunError("it failed")
 
-    monkeypatch.setattr(execution, "execute", fail)
+    monkeypatch.setattr(execute, "execute", fail)
     with pytest.raises(RunError):
         run(project, force=True)
     with pytest.raises(SiteError, match="toy is stale: its last run did not finish"):

@@ -7,11 +7,11 @@ import xml.etree.ElementTree as ET
 import pandas as pd
 import pytest
 
-from replication.choices import register
-from replication.paths import PROJECT
+from replication.evidence.tables import read_table
+from replication.evidence.verdicts import overall
+from replication.files import PROJECT
+from replication.paper.register import load_choices
 from replication.site.overview import choices, citation, interval_plot, published, verdicts
-from replication.tables import read_table
-from replication.verdicts import overall
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_every_choice_is_described() -> None:
     """Each entry of the register has a row and a section that its id leads to."""
     shares = pd.DataFrame({"claim": ["X", "Y"], "choice": ["ALPHA"] * 2, "share": [0.5, 0.01]})
     text = choices(shares)
-    for one in register().values():
+    for one in load_choices().values():
         assert f"[{one.id}](#choice-{one.id.lower()})" in text
         assert f"(choice-{one.id.lower()})=\n\n### {one.id}\n" in text
         assert one.open in text

@@ -7,7 +7,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from replication.choices import register
+from replication.paper.register import load_choices
 from replication.site.pages import Provenance, anchor, link_choices, page
 
 TABLE = "| a   | b   |\n| --- | --- |\n| 1   | 2   |\n"
@@ -53,7 +53,7 @@ def test_a_figure_says_what_one_sees_and_where_it_is_from(folder: Path) -> None:
     for name in ("fig05.csv", "fig05.svg"):
         assert f"<../figures/{name}>`" in text
     assert "`notebook <../source/toy.ipynb>`" in text
-    assert text.rstrip("`\n").endswith("code: {py:func}`~replication.figures.error_figure")
+    assert text.rstrip("`\n").endswith("code: {py:func}`~replication.report.figures.error_figure")
 
 
 def test_code_behind_a_function_of_the_notebook_is_named(folder: Path) -> None:
@@ -64,7 +64,7 @@ def test_code_behind_a_function_of_the_notebook_is_named(folder: Path) -> None:
     ]
     nbformat.write(new_notebook(cells=cells), folder / "toy.ipynb")
     text = page(folder / "toy.ipynb", folder, CAME)["cells"][-1]["source"]
-    assert "{py:func}`~replication.figures.error_figure`" in text
+    assert "{py:func}`~replication.report.figures.error_figure`" in text
 
 
 def test_a_table_has_its_file(folder: Path) -> None:
@@ -104,7 +104,7 @@ def test_unknown_run_times_are_said_to_be_unknown() -> None:
 
 def test_every_choice_is_linked_once() -> None:
     """All ids of the register lead to their entry; longer ids, code and links are left alone."""
-    for id in register():
+    for id in load_choices():
         assert link_choices(f"see {id}.") == f"see [{id}](#choice-{id.lower()})."
         assert link_choices(f"`{id}` [{id}](#x) {id}-OTHER X{id}") == (
             f"`{id}` [{id}](#x) {id}-OTHER X{id}"

@@ -17,19 +17,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
-from replication import qlearning, reference, soccer_learning
-from replication.envs import chipmunk, soccer
-from replication.envs.chipmunk import FastSoccerWorld
-from replication.envs.soccer import (
-    BACKWARD,
-    FORWARD,
-    LEFT,
-    RIGHT,
-    SLOW,
-    Contacts,
-    SoccerParams,
-    SoccerWorld,
-)
+from replication.envs.soccer import compiled, rules
+from replication.envs.soccer.compiled import FastSoccerWorld
+from replication.envs.soccer.rules import BACKWARD, FORWARD, LEFT, RIGHT, SLOW, SoccerParams
+from replication.envs.soccer.world import Contacts, SoccerWorld
+from replication.learning import reference, soccer
+from replication.learning.seeds import stream
 
 OVERLAP = 0.011  # bodies are found to touch after they have moved on for a tick, at most 0.01 m
 # On some processors a compiler may fuse a product and a sum, which rounds once instead of twice.
@@ -87,7 +80,7 @@ def expert() -> tuple[list[tuple[int, int]], list[tuple[float, float]], FastSocc
     places: list[tuple[float, float]] = []
     state, scored = world.reset(), False
     while not scored and len(pairs) < 100:
-        pairs.append((state, soccer.expert_action(state)))
+        pairs.append((state, rules.expert_action(state)))
         places.append(world.pose[:2])
         state, scored, _ = world.step(pairs[-1][1])
     assert scored
@@ -134,7 +127,7 @@ def test_robot_moves_as_planned() -> None:
 def test_wheels_have_a_limit() -> None:
     """However much there is to correct, wheels push no harder than the tyres hold."""
     for velocity, rate in (((0.3, 0.9), 90.0), ((-2.0, 0.1), -90.0)):
-        force_x, force_y, torque = soccer.servo(0.2, rate, 0.0, velocity, 0.0, 0.05)
+        force_x, force_y, torque = rules.servo(0.2, rate, 0.0, velocity, 0.0, 0.05)
         assert math.hypot(force_x, force_y) == pytest.approx(3.5)
         assert force_y / force_x == pytest.approx(velocity[1] / (velocity[0] - 0.2))
         assert torque == math.copysign(0.2, rate)
@@ -142,10 +135,10 @@ def test_wheels_have_a_limit() -> None:
 
 def test_obstacle_is_a_triangle_wave() -> None:
     """An obstacle goes from end to end at its speed, turns round, and is back after a cycle."""
-    for path in soccer.PATHS:
-        half = soccer.half_ticks(path, 0.05)
+    for path in rules.PATHS:
+        half = rules.half_ticks(path, 0.05)
         assert half * 0.05 * path.speed == pytest.approx(math.dist(path.start, path.end))
-        at = [np.array(soccer.obstacle(path, tick, 0.05)) for tick in range(2 * half + 1)]
+        at = [np.array(rules.obstacle(path, tick, 0.05)) for tick in range(2 * half + 1)]
         assert (at[0] == at[-1]).all()
         for now, later in pairwise(at):
             assert later[:2] == pytest.approx(now[:2] + 0.05 * now[2:], abs=1e-12)
@@ -157,10 +150,10 @@ def test_obstacle_is_a_triangle_wave() -> None:
 
 def test_obstacle_paths_leave_room() -> None:
     """Between an obstacle and a wall there is always room for a robot: it is not crushed."""
-    for path in soccer.PATHS:
+    for path in rules.PATHS:
         for x, y in (path.start, path.end):
-            gap = min(x, soccer.WIDTH - x, y, soccer.HEIGHT - y) - soccer.ROBOT_SIDE / 2
-            assert gap >= soccer.ROBOT_SIDE
+            gap = min(x, rules.WIDTH - x, y, rules.HEIGHT - y) - rules.ROBOT_SIDE / 2
+            assert gap >= rules.ROBOT_SIDE
 
 
 def test_rays_by_hand() -> None:
@@ -168,10 +161,10 @@ def test_rays_by_hand() -> None:
     world = SoccerWorld(SoccerParams(rays=4))  # at -135, -45, 45 and 135 degrees
     x, y, _ = world.obstacles[0]
     place(world, pose=(x - 0.10, y, math.pi / 4))
-    near = 0.10 - soccer.ROBOT_SIDE / 2
+    near = 0.10 - rules.ROBOT_SIDE / 2
     assert world.rays() == pytest.approx([0.15, near, 0.15, 0.15])
     place(world, pose=(x - 0.08, y - 0.08, 0.0))
-    corner = (0.08 - soccer.ROBOT_SIDE / 2) * math.sqrt(2)
+    corner = (0.08 - rules.ROBOT_SIDE / 2) * math.sqrt(2)
     assert world.rays() == pytest.approx([0.15, 0.15, corner, 0.15])
 
 
@@ -184,42 +177,42 @@ def test_front_rays() -> None:
     for heading, ahead in ((0.0, True), (math.pi, False)):
         for world, sees in ((front, ahead), (around, True)):
             place(world, pose=(x - 0.12, y, heading))
-            assert soccer.decode(world.state)[2] == sees
+            assert rules.decode(world.state)[2] == sees
 
 
 def test_state_at_borders() -> None:
     """The states number 16 x 12 cells of two each; a border belongs to the cell that it opens."""
     seen = {
-        soccer.encode((i + 0.5) * 1.4 / 16, (j + 0.5) * 0.1, detected): (i, j, detected)
+        rules.encode((i + 0.5) * 1.4 / 16, (j + 0.5) * 0.1, detected): (i, j, detected)
         for i in range(16)
         for j in range(12)
         for detected in (False, True)
     }
     assert sorted(seen) == list(range(384))
-    assert all(soccer.decode(state) == place for state, place in seen.items())
+    assert all(rules.decode(state) == place for state, place in seen.items())
     for i in range(1, 16):
         x = i * 1.4 / 16
-        assert soccer.decode(soccer.encode(x + 1e-9, 0.0, False))[0] == i
-        assert soccer.decode(soccer.encode(x - 1e-9, 0.0, False))[0] == i - 1
-    assert soccer.encode(-0.01, -0.01, False) == soccer.encode(0.0, 0.0, False)
-    assert soccer.encode(1.42, 1.21, False) == soccer.encode(1.39, 1.19, False)
+        assert rules.decode(rules.encode(x + 1e-9, 0.0, False))[0] == i
+        assert rules.decode(rules.encode(x - 1e-9, 0.0, False))[0] == i - 1
+    assert rules.encode(-0.01, -0.01, False) == rules.encode(0.0, 0.0, False)
+    assert rules.encode(1.42, 1.21, False) == rules.encode(1.39, 1.19, False)
 
 
 def test_border_distance() -> None:
     """The distance is to the nearest border between cells; the outline of the field is none."""
-    assert soccer.border_distance(0.001, 0.05) == pytest.approx(0.05)
-    assert soccer.border_distance(0.0875 * 3 + 0.004, 0.95) == pytest.approx(0.004)
-    assert soccer.border_distance(0.0875 * 3.5, 0.9 - 0.003) == pytest.approx(0.003)
+    assert rules.border_distance(0.001, 0.05) == pytest.approx(0.05)
+    assert rules.border_distance(0.0875 * 3 + 0.004, 0.95) == pytest.approx(0.004)
+    assert rules.border_distance(0.0875 * 3.5, 0.9 - 0.003) == pytest.approx(0.003)
 
 
 def test_detection_ends_with_the_rays() -> None:
     """An obstacle is detected within reach of a ray and not a micrometre beyond."""
     world = SoccerWorld()
     x, y, _ = world.obstacles[0]
-    reach = 0.15 + soccer.ROBOT_SIDE / 2
+    reach = 0.15 + rules.ROBOT_SIDE / 2
     for offset, seen in ((1e-6, False), (-1e-6, True)):
         place(world, pose=(x - reach - offset, y, 0.0))
-        assert soccer.decode(world.state)[2] == seen
+        assert rules.decode(world.state)[2] == seen
 
 
 def test_time_out() -> None:
@@ -236,14 +229,14 @@ def test_goal_is_the_whole_ball() -> None:
     """A goal falls when the whole ball is over the line between the posts, not before."""
     world = SoccerWorld()
     place(world, ball=(1.36, 0.6), velocity=(0.1, 0.0))
-    while world.ball[0] < soccer.GOAL_X:
+    while world.ball[0] < rules.GOAL_X:
         before = world.ball[0]
         _, scored, _ = world.step(BACKWARD)
-        assert scored == (world.ball[0] >= 1.4 + soccer.BALL_RADIUS)
-    assert before < soccer.GOAL_X
+        assert scored == (world.ball[0] >= 1.4 + rules.BALL_RADIUS)
+    assert before < rules.GOAL_X
     place(world, ball=(1.36, 0.3), velocity=(0.1, 0.0))  # beside the gate
     assert not any(world.step(BACKWARD)[1] for _ in range(8))
-    assert world.ball[0] < 1.4 - soccer.BALL_RADIUS + OVERLAP
+    assert world.ball[0] < 1.4 - rules.BALL_RADIUS + OVERLAP
 
 
 def test_ball_pinned_to_wall() -> None:
@@ -268,8 +261,8 @@ def test_nothing_gets_out(seed: int) -> None:
             _, scored, _ = world.step(action)
             x, y, _ = world.pose
             u, v = world.ball
-            inner = soccer.ROBOT_SIDE / 2
-            assert inner - OVERLAP < x < 1.4 + soccer.MOUTH - inner + OVERLAP
+            inner = rules.ROBOT_SIDE / 2
+            assert inner - OVERLAP < x < 1.4 + rules.MOUTH - inner + OVERLAP
             assert inner - OVERLAP < y < 1.2 - inner + OVERLAP
             assert 0 < u < 1.5
             assert 0 < v < 1.2
@@ -349,17 +342,17 @@ def test_compiled_world_is_the_plain_world(options: dict[str, Any]) -> None:
 def test_engine_is_not_needed_for_free_decisions() -> None:
     """Decisions without a contact come out the same if they are given to the engine."""
     params = SoccerParams()
-    law = chipmunk.Law.of(params)
+    law = compiled.Law.of(params)
     keep: list[Any] = []
-    engine = chipmunk.engine(keep)
+    engine = compiled.engine(keep)
     glided = 0
     for i, (pose, ball) in enumerate(random_places(2, 300)):
         now, clock = np.array([*pose, *ball, 0.0, 0.0]), np.array([17, 0, 0])
-        plan = soccer.plan(params, i % 5, pose, ball)
+        plan = rules.plan(params, i % 5, pose, ball)
         other, other_clock = now.copy(), clock.copy()
-        if chipmunk._glide(law, *plan, now, clock):
+        if compiled._glide(law, *plan, now, clock):
             glided += 1
-            assert not chipmunk._collide(engine, law, *plan, other, other_clock)
+            assert not compiled._collide(engine, law, *plan, other, other_clock)
             assert (clock == other_clock).all()
             assert now == pytest.approx(other, rel=0, abs=0 if EXACT else 1e-12)
     assert 100 < glided < 300
@@ -369,16 +362,16 @@ def test_compiled_rays_are_the_engines() -> None:
     """Rays by geometry and by pymunk's segment queries have the same length."""
     rng = np.random.default_rng(3)
     space = pymunk.Space()
-    space.add(pymunk.Poly.create_box(space.static_body, (soccer.ROBOT_SIDE, soccer.ROBOT_SIDE)))
-    law, hits = chipmunk.Law.of(SoccerParams()), 0
+    space.add(pymunk.Poly.create_box(space.static_body, (rules.ROBOT_SIDE, rules.ROBOT_SIDE)))
+    law, hits = compiled.Law.of(SoccerParams()), 0
     for x, y, angle in rng.uniform((-0.15, -0.15, -4), (0.15, 0.15, 4), (500, 3)).tolist():
-        if max(abs(x), abs(y)) < soccer.ROBOT_SIDE / 2:
+        if max(abs(x), abs(y)) < rules.ROBOT_SIDE / 2:
             continue
         along = math.cos(angle), math.sin(angle)
         tip = x + along[0], y + along[1]
         hit = space.segment_query_first((x, y), tip, 0.0, pymunk.ShapeFilter())
         hits += hit is not None
-        length = chipmunk._ray(law, x, y, *along)
+        length = compiled._ray(law, x, y, *along)
         assert length == pytest.approx(hit.alpha if hit else math.inf)
     assert hits > 50
 
@@ -440,7 +433,7 @@ def test_expert() -> None:
     assert slow == list(range(slow[0], slow[0] + 3))
     assert {action for _, action in pairs} == {FORWARD, SLOW}
     assert world.time < 10
-    assert min(soccer.border_distance(*place) for place in places) >= 0.001
+    assert min(rules.border_distance(*place) for place in places) >= 0.001
 
 
 def test_expert_has_a_reason() -> None:
@@ -458,7 +451,7 @@ def test_expert_has_a_reason() -> None:
 def learn_plainly(
     params: SoccerParams, weights: Any, q: Any, stream: list[int], options: dict[str, Any]
 ) -> tuple[Any, list[int], int]:
-    """Learn in the uncompiled world by the definitions of `replication.reference`."""
+    """Learn in the uncompiled world by the definitions of `replication.learning.reference`."""
     world, steps, episodes = FastSoccerWorld(params), 0, options["episodes"]
     for epsilon in np.linspace(options["epsilon_start"], options["epsilon_end"], episodes).tolist():
         state, done = world.reset(), False
@@ -477,7 +470,7 @@ def tables(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     """Weights that lead to the goal and back, values with ties, and a stream."""
     rng = np.random.default_rng(seed)
     q = rng.integers(0, 3, (384, 5)).astype(float)
-    return rng.normal(size=(384, 5)), q, qlearning.stream(np.random.SeedSequence(seed))
+    return rng.normal(size=(384, 5)), q, stream(np.random.SeedSequence(seed))
 
 
 @pytest.mark.parametrize("random_ties", [True, False])
@@ -494,7 +487,7 @@ def test_learning_is_the_reference(random_ties: bool, macro: str) -> None:
     options |= {"epsilon_start": 0.3, "epsilon_end": 0.05}
     weights, q, stream = tables(6)
     weights[:, FORWARD] += 1.0  # so that some episodes end with a goal
-    got = soccer_learning.learn_trial(params, weights, q, stream, **options)
+    got = soccer.learn_trial(params, weights, q, stream, **options)
     wanted = learn_plainly(params, weights.tolist(), q.tolist(), stream.tolist(), options)
     assert got[0].tolist() == wanted[0]
     assert got[1].tolist() == wanted[1]
@@ -511,10 +504,10 @@ def test_goal_and_time_out_in_the_target() -> None:
     stream = np.arange(1, 5, dtype=np.uint64)
     rates: dict[str, Any] = {"beta": 1.0, "gamma": 0.5, "epsilon_start": 0.0, "epsilon_end": 0.0}
     zero = np.zeros((384, 5))
-    got, _, n = soccer_learning.learn_trial(SoccerParams(), zero, q, stream, episodes=1, **rates)
+    got, _, n = soccer.learn_trial(SoccerParams(), zero, q, stream, episodes=1, **rates)
     assert (n, got[pairs[-1]]) == (15, 0.0)
     short = SoccerParams(time_limit=world.time - 0.3)  # before the last decision
-    got, _, n = soccer_learning.learn_trial(short, zero, q, stream, episodes=1, **rates)
+    got, _, n = soccer.learn_trial(short, zero, q, stream, episodes=1, **rates)
     assert (n, got[pairs[-2]]) == (14, 0.5)
 
 
@@ -524,12 +517,12 @@ def test_roll_out_of_the_expert() -> None:
     q = np.zeros((384, 5))
     for state, action in pairs:
         q[state, action] = 1.0
-    stream = qlearning.stream(np.random.SeedSequence(7))
-    states, actions, hits, after = soccer_learning.roll_out(SoccerParams(), q, stream)
+    words = stream(np.random.SeedSequence(7))
+    states, actions, hits, after = soccer.roll_out(SoccerParams(), q, words)
     assert list(zip(states[:-1].tolist(), actions.tolist(), strict=True)) == pairs
     assert states[-1] == world.state
     assert hits.tolist() == [False] * len(pairs)
-    words = stream.tolist()
+    words = words.tolist()
     for _ in pairs:
         reference.draw(words)
     assert after.tolist() == words
@@ -559,7 +552,7 @@ def test_learning_checks_its_arguments(change: dict[str, Any], message: str) -> 
         "epsilon_end": 0.05,
     }
     with pytest.raises(ValueError, match=message):
-        soccer_learning.learn_trial(SoccerParams(), **(arguments | change))
+        soccer.learn_trial(SoccerParams(), **(arguments | change))
 
 
 # Gymnasium.
@@ -585,5 +578,5 @@ def test_picture() -> None:
     image: Any = env.render()
     blue = np.argwhere((image == (40, 80, 200)).all(axis=-1))
     row, column = blue.mean(axis=0)
-    assert (column / 200, 1.2 - row / 200) == pytest.approx(soccer.ROBOT_START, abs=0.02)
+    assert (column / 200, 1.2 - row / 200) == pytest.approx(rules.ROBOT_START, abs=0.02)
     assert np.ptp(blue, axis=0).max() < 0.075 * math.sqrt(2) * 200

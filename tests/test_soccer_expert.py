@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from replication import Demos, load_demos
-from replication.envs.chipmunk import FastSoccerWorld
-from replication.envs.field import SoccerField
-from replication.envs.soccer import BACKWARD, FORWARD, SLOW, border_distance, decode, expert_action
-from replication.params import SoccerExpert
-from replication.paths import PROJECT
-from replication.soccer_expert import demonstrate_soccer
+from replication.demos.soccer_expert import SoccerExpert, demonstrate_soccer
+from replication.envs.soccer.compiled import FastSoccerWorld
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import (
+    BACKWARD,
+    FORWARD,
+    SLOW,
+    border_distance,
+    decode,
+    expert_action,
+)
+from replication.files import PROJECT
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from replication import source
-from replication.paths import PROJECT
+from replication.files import PROJECT
 
 MODULES = {
     "__init__": "",
@@ -132,7 +132,7 @@ def test_bare_source_has_no_prose(text: str, bare: str) -> None:
 
 @pytest.fixture
 def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """Return the names of the modules that are read for the hash of `replication.compute`."""
+    """Return the names of the modules that are read for the hash of `replication.trials.compute`."""
     read: set[str] = set()
     whole = Path.read_bytes
 
@@ -141,7 +141,7 @@ def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
         return whole(self)
 
     monkeypatch.setattr(Path, "read_bytes", noted)
-    source.source_hash.__wrapped__("replication.compute")
+    source.source_hash.__wrapped__("replication.trials.compute")
     return read
 
 
@@ -158,7 +158,7 @@ def test_drawing_and_reporting_do_not_count(hashed_files: set[str]) -> None:
 
 
 def test_hash_covers_all_that_python_loads(hashed_files: set[str]) -> None:
-    """Each module of the package that Python loads for `replication.compute` is in the hash."""
+    """Each module of the package that Python loads for `replication.trials.compute` is in the hash."""
     program = f"""
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -186,6 +186,6 @@ def test_no_module_hides_its_imports() -> None:
 
 def test_hash_is_the_same_again() -> None:
     """The hash does not depend on the order in which modules are found."""
-    again = source.source_hash.__wrapped__("replication.compute")
-    assert again == source.source_hash("replication.compute")
+    again = source.source_hash.__wrapped__("replication.trials.compute")
+    assert again == source.source_hash("replication.trials.compute")
     assert len(again) == 64

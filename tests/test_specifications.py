@@ -9,33 +9,35 @@ import numpy as np
 import pytest
 
 from replication import Demos, Maze, load_demos
-from replication.choices import ChoiceError, register
-from replication.claims import ClaimError, claims
-from replication.comparisons import EXPERIMENTS, F_INDICES
-from replication.measures import marked_pairs
-from replication.paths import PROJECT, resolve
-from replication.setting import Setting
-from replication.specifications import (
+from replication.envs.maze import as_maze
+from replication.evidence.claims import ClaimError, load_claims
+from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.specifications import (
     MAPS,
     MOVES,
     OBSTACLES,
     RANDOM,
     Factorial,
     Specification,
-    declared,
     default_of,
     factorial_specifications,
-    maze_settings,
-    numbered_settings,
+    load_specifications,
+    maze_conditions,
+    numbered_conditions,
     parse_specifications,
     random_mazes,
     single_specifications,
-    soccer_settings,
-    trace_settings,
+    soccer_conditions,
+    trace_conditions,
 )
+from replication.files import PROJECT, resolve
+from replication.irl import READINGS
+from replication.paper.register import ChoiceError, load_choices
+from replication.trials.condition import Condition
+from replication.trials.measures import marked_pairs
 
 TEXT = (PROJECT / "replication" / "specifications.toml").read_text(encoding="utf-8")
-PLAN = declared()
+PLAN = load_specifications()
 CAP = PLAN.iteration_cap
 SINGLE = single_specifications(PLAN.mazes.single.choices)
 SOCCER = single_specifications(PLAN.soccer.single.choices)
@@ -64,8 +66,8 @@ def test_enough_is_declared() -> None:
 
 def test_root_seed_is_the_judging_one() -> None:
     """The same trials are behind the verdicts and the defaults of the specifications."""
-    assert claims().judging.root_seed == PLAN.root_seed
-    assert PLAN.mazes.single.trials >= claims().judging.fewest
+    assert load_claims().judging.root_seed == PLAN.root_seed
+    assert PLAN.mazes.single.trials >= load_claims().judging.fewest
 
 
 def test_every_claim_with_an_effect_is_evaluated() -> None:
@@ -73,7 +75,7 @@ def test_every_claim_with_an_effect_is_evaluated() -> None:
     evaluated = {*PLAN.mazes.claims, *PLAN.soccer.claims}
     due = {
         one.id
-        for one in claims().claim
+        for one in load_claims().claim
         if one.direction != "inside" and one.task != "obstacle-maze"
     }
     assert evaluated == due
@@ -94,9 +96,9 @@ def test_every_open_choice_of_the_mazes_is_varied() -> None:
     """What the paper leaves open and a parameter holds is in the list, but for soccer's own."""
     left_out = {
         id
-        for id, one in register().items()
+        for id, one in load_choices().items()
         if one.field.split(".")[0] in ("Learner", "Loop", "Update", "Expert", "Demonstrations")
-        and not one.is_stated
+        and not one.open.startswith("stated:")
         and id not in PLAN.mazes.single.choices
     }
     assert left_out <= {"HORIZON", "ITERATION-CAP", "GOAL-VALUE"}
@@ -147,102 +149,105 @@ def test_factorial_depends_on_its_seed_alone() -> None:
 
 
 @pytest.fixture(scope="module")
-def default() -> dict[tuple[str, str], Setting]:
-    """Return the settings of the default specification."""
-    return maze_settings(SINGLE[0], CAP)
+def default() -> dict[tuple[str, str], Condition]:
+    """Return the conditions of the default specification."""
+    return maze_conditions(SINGLE[0], CAP)
 
 
 def test_default_is_the_experiment_of_the_open_maze(
-    default: dict[tuple[str, str], Setting],
+    default: dict[tuple[str, str], Condition],
 ) -> None:
-    """Under the default the settings are those of Table I, but for the iteration cap."""
-    table = EXPERIMENTS["open-maze"].settings()
+    """Under the default the conditions are those of Table I, but for the iteration cap."""
+    table = EXPERIMENTS["open-maze"].conditions()
     assert set(default) == {key for key in table if key[1] in ("", "printed")}
-    for key, setting in default.items():
-        assert setting.demos.correct == table[key].demos.correct
-        assert setting.demos.incorrect == table[key].demos.incorrect
-        assert setting.params.differences() == {"ITERATION-CAP": CAP}
+    for key, condition in default.items():
+        assert condition.demos.correct == table[key].demos.correct
+        assert condition.demos.incorrect == table[key].demos.incorrect
+        assert condition.params.differences() == {"ITERATION-CAP": CAP}
 
 
 @pytest.mark.parametrize(
     "one", [s for s in SINGLE[1:] if s.choices[0][1] not in SLOW], ids=lambda s: s.name
 )
 def test_single_specification_changes_one_choice(
-    one: Specification, default: dict[tuple[str, str], Setting]
+    one: Specification, default: dict[tuple[str, str], Condition]
 ) -> None:
     """Either one parameter or the demonstrations differ from the default, and nothing else."""
     ((id, value),) = one.choices
-    settings = maze_settings(one, CAP)
+    conditions = maze_conditions(one, CAP)
     reading = value if id == "F-INDEX" else "printed"
-    assert set(settings) == {(method, f and reading) for method, f in default}
-    for (method, f), setting in settings.items():
+    assert set(conditions) == {(method, f and reading) for method, f in default}
+    for (method, f), condition in conditions.items():
         other = default[method, f and "printed"]
-        changed = setting.params.differences()
+        changed = condition.params.differences()
         if expert_choices(one):
             assert changed == {"ITERATION-CAP": CAP}
-            assert setting.demos != other.demos
+            assert condition.demos != other.demos
             same_maze = (
-                setting.demos.maze.next_state.tolist() == other.demos.maze.next_state.tolist()
+                as_maze(condition.demos.environment).next_state.tolist()
+                == as_maze(other.demos.environment).next_state.tolist()
             )
             assert same_maze == (id != "MAP")
             if id == "DETOUR-WIDTH":
-                assert setting.demos.correct == other.demos.correct
+                assert condition.demos.correct == other.demos.correct
             elif id != "MAP":
-                assert len(setting.demos.correct[0].actions) == 31
-                assert setting.demos.correct != other.demos.correct
+                assert len(condition.demos.correct[0].actions) == 31
+                assert condition.demos.correct != other.demos.correct
         else:
             due = {id: value} if (id, f) != ("F-INDEX", "") else {}
             assert changed == {"ITERATION-CAP": CAP, **due}
-            assert setting.demos == other.demos
+            assert condition.demos == other.demos
 
 
 @pytest.mark.parametrize("one", SOCCER, ids=lambda s: s.name)
 def test_soccer_specification_changes_one_choice(one: Specification) -> None:
     """In robot soccer, too: a parameter, the world, or where the expert errs."""
-    task = EXPERIMENTS["soccer"].settings()
+    task = EXPERIMENTS["soccer"].conditions()
     base = next(iter(task.values()))
     usual = {**base.params.differences(), "ITERATION-CAP": CAP}
-    settings = soccer_settings(one, CAP)
+    conditions = soccer_conditions(one, CAP)
     choices = dict(one.choices)
     reading = choices.pop("F-INDEX", "printed")
-    assert set(settings) == {(method, reading) for method, f in task if f == "printed"}
+    assert set(conditions) == {(method, reading) for method, f in task if f == "printed"}
     if "SOCCER-EPISODES" in choices:
         choices["EPISODES"] = choices.pop("SOCCER-EPISODES")
     world = {
-        id: choices.pop(id) for id in list(choices) if register()[id].field.startswith("SoccerP")
+        id: choices.pop(id)
+        for id in list(choices)
+        if load_choices()[id].field.startswith("SoccerP")
     }
     elsewhere = choices.pop("SOCCER-INCORRECT", None)
-    for setting in settings.values():
-        assert (setting.demos.incorrect != base.demos.incorrect) == bool(elsewhere or world)
+    for condition in conditions.values():
+        assert (condition.demos.incorrect != base.demos.incorrect) == bool(elsewhere or world)
         due = {**usual, **choices, **({"F-INDEX": "updated"} if reading == "updated" else {})}
-        assert setting.params.differences() == due
-        theirs, ours = base.demos.environment, setting.demos.environment
+        assert condition.params.differences() == due
+        theirs, ours = base.demos.environment, condition.demos.environment
         assert (theirs.params != ours.params) == bool(world)  # type: ignore[attr-defined]
         for id, value in world.items():
-            name = register()[id].field.split(".")[1]
+            name = load_choices()[id].field.split(".")[1]
             assert getattr(ours.params, name) == value  # type: ignore[attr-defined]
             alike = replace(ours.params, **{name: getattr(theirs.params, name)})  # type: ignore[attr-defined]
             assert alike == theirs.params  # type: ignore[attr-defined]
 
 
 def test_factorial_specification_sets_all_its_choices() -> None:
-    """Every choice of a specification is found in its settings, the cap in all of them."""
+    """Every choice of a specification is found in its conditions, the cap in all of them."""
     few = [one for one in FACTORIAL if dict(one.choices)["MAP"] in ("open", "obstacles")][:12]
     assert {dict(one.choices)["DEMO-SHAPE"] for one in few} > {RANDOM}
     for one in few:
         choices = dict(one.choices)
-        settings = maze_settings(one, CAP)
+        conditions = maze_conditions(one, CAP)
         reading = choices.pop("F-INDEX")
         moves = {"open": 31, "obstacles": 33}[str(choices.pop("MAP"))]
         del choices["DEMO-SHAPE"]
-        assert {f for _, f in settings} == {"", reading}
-        for (_, f), setting in settings.items():
-            assert len(setting.demos.correct[0].actions) == moves
-            values = setting.params.values()
+        assert {f for _, f in conditions} == {"", reading}
+        for (_, f), condition in conditions.items():
+            assert len(condition.demos.correct[0].actions) == moves
+            values = condition.params.values()
             assert values["max_iterations"] == CAP
             assert values["f_index"] == (reading if f else "printed")
             for id, value in choices.items():
-                assert values[register()[id].field.split(".")[1]] == value
+                assert values[load_choices()[id].field.split(".")[1]] == value
 
 
 # --- what is refused -------------------------------------------------------------------------
@@ -305,7 +310,7 @@ def test_bad_entry_is_one_line(old: str, new: str, said: str) -> None:
 @pytest.fixture(scope="module")
 def template() -> Maze:
     """Return the open maze."""
-    return load_demos(resolve(EXPERIMENTS["open-maze"].demos)).maze
+    return as_maze(load_demos(resolve(EXPERIMENTS["open-maze"].demos)).environment)
 
 
 def test_random_mazes_are_as_declared(template: Maze) -> None:
@@ -337,12 +342,15 @@ def test_random_mazes_depend_on_their_seed_alone(template: Maze) -> None:
 def test_random_map_lets_the_expert_show_everything(template: Maze) -> None:
     """In a declared random maze each kind of mistake can be driven, and the task has its name."""
     one = Specification("single", (("MAP", "random-1"), ("INCORRECT-KINDS", "all")))
-    demos = maze_settings(one, CAP)["unified-incorrect", "printed"].selected
+    demos = maze_conditions(one, CAP)["unified-incorrect", "printed"].selected
     stored = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
     assert set(demos.kinds) == set(stored.kinds)
     assert (demos.task, len(demos.correct[0].actions)) == ("random-1-maze", MOVES)
-    assert (~demos.maze.free).sum() == OBSTACLES
-    assert (demos.maze.start, demos.maze.goal) == (template.start, template.goal)
+    assert (~as_maze(demos.environment).free).sum() == OBSTACLES
+    assert (as_maze(demos.environment).start, as_maze(demos.environment).goal) == (
+        template.start,
+        template.goal,
+    )
     assert {map.removeprefix("random-") for map in MAPS[2:]} == {"1", "2", "3"}
 
 
@@ -351,12 +359,12 @@ def test_random_map_lets_the_expert_show_everything(template: Maze) -> None:
 
 def test_ablations_of_the_trace() -> None:
     """The default and two ablations, each without and with incorrect ones, under both readings."""
-    found = trace_settings(PLAN.ablations, CAP)
+    found = trace_conditions(PLAN.ablations, CAP)
     assert len(found) == 12
-    for name, setting in found.items():
+    for name, condition in found.items():
         label, reading, changed = name.rsplit(", ", 2)
-        update = setting.params.update
-        assert ("with incorrect" in label) == (setting.method == "unified-incorrect")
+        update = condition.params.update
+        assert ("with incorrect" in label) == (condition.method == "unified-incorrect")
         assert ("updated" in reading) == (update.f_index == "updated")
         due = {
             "default": (default_of("ALPHA"), default_of("F-START")),
@@ -364,22 +372,22 @@ def test_ablations_of_the_trace() -> None:
             "ALPHA=0.0": (0.0, default_of("F-START")),
         }[changed]
         assert (update.alpha, update.f_start) == due
-        assert setting.params.loop.max_iterations == CAP
-        assert setting.demos.task == "open-maze"
+        assert condition.params.loop.max_iterations == CAP
+        assert condition.demos.task == "open-maze"
 
 
 @pytest.fixture(scope="module")
-def numbered() -> dict[tuple[int, str], Setting]:
-    """Return the settings with ever more incorrect demonstrations."""
-    return numbered_settings(PLAN.ablations, CAP)
+def numbered() -> dict[tuple[int, str], Condition]:
+    """Return the conditions with ever more incorrect demonstrations."""
+    return numbered_conditions(PLAN.ablations, CAP)
 
 
-def test_more_demonstrations_mark_more_pairs(numbered: dict[tuple[int, str], Setting]) -> None:
+def test_more_demonstrations_mark_more_pairs(numbered: dict[tuple[int, str], Condition]) -> None:
     """Each set holds the one before, so that the marked pairs grow from none to all."""
     before: tuple[Any, ...] = ()
     marked = np.zeros((400, 4), dtype=bool)
     for number in dict.fromkeys(number for number, _ in numbered):
-        shown = {numbered[number, f].selected for f in F_INDICES}
+        shown = {numbered[number, f].selected for f in READINGS}
         (selected,) = {one.incorrect for one in shown}
         assert len(selected) == number
         assert selected[: len(before)] == before
@@ -390,11 +398,11 @@ def test_more_demonstrations_mark_more_pairs(numbered: dict[tuple[int, str], Set
     assert number > max(n for n in PLAN.ablations.numbers if n != "all")
 
 
-def test_all_demonstrations_mark_all_pairs(numbered: dict[tuple[int, str], Setting]) -> None:
+def test_all_demonstrations_mark_all_pairs(numbered: dict[tuple[int, str], Condition]) -> None:
     """The largest set marks each pair of a state that is not the goal that the expert lacks."""
     largest = max(number for number, _ in numbered)
     demos = numbered[largest, "printed"].selected
-    maze, (correct,) = demos.maze, demos.correct
+    maze, (correct,) = as_maze(demos.environment), demos.correct
     due = np.repeat(maze.free[:, None], 4, axis=1)
     due[maze.goal] = False
     due[correct.states[:-1], correct.actions] = False
@@ -403,11 +411,11 @@ def test_all_demonstrations_mark_all_pairs(numbered: dict[tuple[int, str], Setti
 
 
 def test_numbered_demonstrations_lead_to_their_pair(
-    numbered: dict[tuple[int, str], Setting],
+    numbered: dict[tuple[int, str], Condition],
 ) -> None:
     """Each is a shortest way to a state and then one wrong action; no two show the same pair."""
     demos = numbered[max(number for number, _ in numbered), "printed"].selected
-    maze = demos.maze
+    maze = as_maze(demos.environment)
     back = distances_from_start(demos)
     pairs = set()
     for demo in demos.incorrect:
@@ -420,7 +428,7 @@ def test_numbered_demonstrations_lead_to_their_pair(
 
 def distances_from_start(demos: Demos) -> dict[int, int]:
     """Return the number of moves from the start to every state, not through the goal."""
-    maze = demos.maze
+    maze = as_maze(demos.environment)
     found, layer, moves = {maze.start: 0}, {maze.start}, 0
     while layer:
         moves += 1
@@ -432,13 +440,13 @@ def distances_from_start(demos: Demos) -> dict[int, int]:
 
 
 def test_numbered_settings_differ_in_demonstrations_alone(
-    numbered: dict[tuple[int, str], Setting],
+    numbered: dict[tuple[int, str], Condition],
 ) -> None:
     """Without incorrect demonstrations it is the method that uses none; the cap reaches all."""
-    for (number, f), setting in numbered.items():
-        assert setting.method == ("unified-incorrect" if number else "unified")
-        assert setting.params.update.f_index == f
-        changed = set(setting.params.differences()) - {"F-INDEX"}
+    for (number, f), condition in numbered.items():
+        assert condition.method == ("unified-incorrect" if number else "unified")
+        assert condition.params.update.f_index == f
+        changed = set(condition.params.differences()) - {"F-INDEX"}
         assert changed == {"ITERATION-CAP", "INCORRECT-KINDS"}
-        assert setting.params.loop.max_iterations == CAP
-        assert setting.demos.correct == numbered[0, "printed"].demos.correct
+        assert condition.params.loop.max_iterations == CAP
+        assert condition.demos.correct == numbered[0, "printed"].demos.correct

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from replication import statistics
-from replication.statistics import (
+from replication.evidence import statistics
+from replication.evidence.statistics import (
     FEWEST,
     RESAMPLES_OF_MANY,
     compare,
@@ -80,7 +80,7 @@ def test_spread_by_hand() -> None:
 @given(COUNTS)
 @settings(deadline=None, max_examples=8)
 def test_a_sample_does_not_differ_from_itself(x: list[int]) -> None:
-    """Against itself a setting differs by 0, is fewer in half of the pairs, and no test rejects."""
+    """Against itself a condition differs by 0, is fewer in half of the pairs, and no test rejects."""
     found = compare(x, x, published=-4.8)
     assert (found.difference, found.low, found.high, found.fewer) == (0.0, 0.0, 0.0, 0.5)
     assert (found.p_welch, found.p_wilcoxon) == (1.0, 1.0)

@@ -8,10 +8,11 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication import paths, status
-from replication.regenerate import run_notebooks
-from replication.runs import prepare
-from replication.status import status_lines
+from replication import files
+from replication.pipeline import status
+from replication.pipeline.plan import prepare
+from replication.pipeline.run import run_notebooks
+from replication.pipeline.status import status_lines
 
 
 @pytest.fixture
@@ -217,7 +218,7 @@ def test_what_is_badly_remembered_is_forgotten(project: Path, entry: str) -> Non
 
 def test_what_this_repository_publishes_is_fresh(tmp_path: Path) -> None:
     """In a fresh clone, in which nothing has run, every figure and table is up to date."""
-    notebooks = sorted((paths.PROJECT / "notebooks").glob("*.ipynb"))
+    notebooks = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
     runs = prepare(notebooks, profile="paper")
-    found = status_lines(runs, paths.PROJECT / "figures", tmp_path)
+    found = status_lines(runs, files.PROJECT / "figures", tmp_path)
     assert found[-1] == "everything is fresh; replicate verify proves it", "\n".join(found)

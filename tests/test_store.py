@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replication.irl import Snapshots, Trial
-from replication.store import DamagedTrialError, Store
-from replication.tasks import Episode
+from replication.irl.agent import Episode
+from replication.trials.store import DamagedTrialError, Store
 
 FLOATS = st.floats(width=64)
 LENGTHS = st.lists(st.integers(0, 6), min_size=1, max_size=5)

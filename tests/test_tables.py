@@ -8,12 +8,9 @@ import pandas as pd
 import pytest
 
 from replication import Demos, Maze, demonstrate
-from replication.comparisons import F_INDICES, Key, method_settings, set_settings
-from replication.paper import TABLE_1
-from replication.paths import PROJECT
-from replication.setting import Setting
-from replication.statistics import compare, holm
-from replication.tables import (
+from replication.evidence.experiments import Key, method_conditions, set_conditions
+from replication.evidence.statistics import compare, holm
+from replication.evidence.tables import (
     PAIRS,
     contrasts_table,
     markdown,
@@ -33,48 +30,52 @@ from replication.tables import (
     write_csv,
     write_trials,
 )
-from replication.verdicts import overall
+from replication.evidence.verdicts import overall
+from replication.files import PROJECT
+from replication.irl import READINGS
+from replication.paper.published import TABLE_1
+from replication.trials.condition import Condition
 
 MEANS = {"adaboost": 45, "unified": 40, "unified-incorrect": 36}
 
 
 def _trials(
-    settings: dict[Key, Setting], *, capped: str | None = None, seed: int = 0
+    conditions: dict[Key, Condition], *, capped: str | None = None, seed: int = 0
 ) -> pd.DataFrame:
     """Make trials up: each method's iterations scatter around its mean."""
     rng = np.random.default_rng(seed)
     parts = []
-    for (_, f), setting in settings.items():
-        counts = MEANS[setting.method] + rng.integers(-4, 5, size=40)
-        if setting.method == "adaboost":
+    for (_, f), condition in conditions.items():
+        counts = MEANS[condition.method] + rng.integers(-4, 5, size=40)
+        if condition.method == "adaboost":
             counts += rng.integers(-12, 13, size=40)
         columns = {
-            "task": setting.demos.task,
-            "method": setting.method,
+            "task": condition.demos.task,
+            "method": condition.method,
             "trial": np.arange(40),
             "seed": 1,
             "iterations": counts,
             "converged": (np.arange(40) > 0) | (f != capped),
             "steps": 1,
-            "choices": setting.choices,
+            "choices": condition.choices,
         }
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts)
 
 
 @pytest.fixture(scope="module")
-def settings(small_demos: Demos) -> dict[Key, Setting]:
-    """Return the settings of Table I for a small maze."""
-    return method_settings(small_demos, {})
+def conditions(small_demos: Demos) -> dict[Key, Condition]:
+    """Return the conditions of Table I for a small maze."""
+    return method_conditions(small_demos, {})
 
 
-def test_summary_is_that_of_the_trials(settings: dict[Key, Setting]) -> None:
+def test_summary_is_that_of_the_trials(conditions: dict[Key, Condition]) -> None:
     """Mean, SD and quartiles equal those that pandas computes from the rows."""
-    trials = _trials(settings)
-    table = summary_table(trials, settings, TABLE_1)
+    trials = _trials(conditions)
+    table = summary_table(trials, conditions, TABLE_1)
     assert len(table) == 5
-    for (_, row), setting in zip(table.iterrows(), settings.values(), strict=True):
-        counts = rows_of(trials, setting)["iterations"]
+    for (_, row), condition in zip(table.iterrows(), conditions.values(), strict=True):
+        counts = rows_of(trials, condition)["iterations"]
         assert row["mean"] == pytest.approx(counts.mean())
         assert row["sd"] == pytest.approx(counts.std())
         assert row["median"] == counts.median()
@@ -82,30 +83,30 @@ def test_summary_is_that_of_the_trials(settings: dict[Key, Setting]) -> None:
         assert row["predicted_low"] < row["paper_mean"] < row["predicted_high"]
 
 
-def test_capped_trials_are_counted_and_never_averaged(settings: dict[Key, Setting]) -> None:
+def test_capped_trials_are_counted_and_never_averaged(conditions: dict[Key, Condition]) -> None:
     """One trial at the cap withholds the mean and leaves its contrasts without numbers."""
-    trials = _trials(settings, capped="updated")
-    table = summary_table(trials, settings, TABLE_1).set_index("F")
+    trials = _trials(conditions, capped="updated")
+    table = summary_table(trials, conditions, TABLE_1).set_index("F")
     assert (table.loc["updated", "capped"] == 1).all()
     assert table.loc["updated", "mean"].isna().all()
     assert table.loc["printed", "mean"].notna().all()
-    contrasts = contrasts_table(trials, settings).set_index("F")
+    contrasts = contrasts_table(trials, conditions).set_index("F")
     numbers = contrasts.columns.drop(["x", "y", "n"])
     assert contrasts.loc["updated", numbers].isna().all(axis=None)
     assert contrasts.loc["printed", numbers].notna().all(axis=None)
     assert set(contrasts["n"]) == {40}
 
 
-def test_contrasts_are_paired_comparisons(settings: dict[Key, Setting]) -> None:
-    """Each row compares two settings of one reading trial by trial; AdaBoost stands in both."""
-    trials = _trials(settings)
+def test_contrasts_are_paired_comparisons(conditions: dict[Key, Condition]) -> None:
+    """Each row compares two conditions of one reading trial by trial; AdaBoost stands in both."""
+    trials = _trials(conditions)
     trials.loc[trials["choices"] == "F-INDEX=updated", "iterations"] += 100
-    table = contrasts_table(trials.sample(frac=1.0, random_state=1), settings)
+    table = contrasts_table(trials.sample(frac=1.0, random_state=1), conditions)
     keys = list(table[["x", "y", "F"]].itertuples(index=False, name=None))
-    assert keys == [(x, y, f) for x, y in PAIRS for f in F_INDICES]
+    assert keys == [(x, y, f) for x, y in PAIRS for f in READINGS]
     for row in table.to_dict("records"):
-        one = settings[row["x"], row["F"]]
-        other = settings.get((row["y"], row["F"]), settings.get((row["y"], "")))
+        one = conditions[row["x"], row["F"]]
+        other = conditions.get((row["y"], row["F"]), conditions.get((row["y"], "")))
         assert other is not None
         x, y = (rows_of(trials, each)["iterations"] for each in (one, other))
         found = compare(x, y)
@@ -115,10 +116,10 @@ def test_contrasts_are_paired_comparisons(settings: dict[Key, Setting]) -> None:
     assert against["updated"] - against["printed"] == pytest.approx(100, abs=3)
 
 
-def test_contrasts_without_a_method_are_left_out(settings: dict[Key, Setting]) -> None:
+def test_contrasts_without_a_method_are_left_out(conditions: dict[Key, Condition]) -> None:
     """In robot soccer, where AdaBoost-IRL is not run, there is nothing to compare it with."""
-    fewer = {key: one for key, one in settings.items() if key[0] != "adaboost"}
-    table = contrasts_table(_trials(settings), fewer)
+    fewer = {key: one for key, one in conditions.items() if key[0] != "adaboost"}
+    table = contrasts_table(_trials(conditions), fewer)
     assert table["x"].tolist() == ["unified-incorrect"] * 2
 
 
@@ -149,7 +150,7 @@ def test_stored_sets_differ_in_nearness(stored_demos: Demos) -> None:
 
 def test_sets_compare_with_no_incorrect_demonstrations(small_demos: Demos) -> None:
     """Each set's difference is from the empty set of the same reading."""
-    sets = set_settings(small_demos, {})
+    sets = set_conditions(small_demos, {})
     trials = _trials(sets).drop_duplicates(["method", "choices", "trial"])
     table = sets_table(trials, sets)
     assert len(table) == len(sets)
@@ -162,13 +163,13 @@ def test_sets_compare_with_no_incorrect_demonstrations(small_demos: Demos) -> No
 
 
 def test_readable_tables_have_a_row_for_each_row(
-    settings: dict[Key, Setting], small_demos: Demos
+    conditions: dict[Key, Condition], small_demos: Demos
 ) -> None:
     """What is printed for readers has as many rows and no NaN."""
-    trials = _trials(settings, capped="updated")
-    summary = summary_table(trials, settings, {"unified": TABLE_1["unified"]})
-    contrasts = contrasts_table(trials, settings)
-    sets = set_settings(small_demos, {})
+    trials = _trials(conditions, capped="updated")
+    summary = summary_table(trials, conditions, {"unified": TABLE_1["unified"]})
+    contrasts = contrasts_table(trials, conditions)
+    sets = set_conditions(small_demos, {})
     saved = sets_table(_trials(sets).drop_duplicates(["method", "choices", "trial"]), sets)
     for table, readable in (
         (summary, readable_summary(summary)),
@@ -179,9 +180,9 @@ def test_readable_tables_have_a_row_for_each_row(
     assert len(readable_sets(saved)) == len(saved) / 2
 
 
-def test_readable_contrasts_by_hand(settings: dict[Key, Setting]) -> None:
+def test_readable_contrasts_by_hand(conditions: dict[Key, Condition]) -> None:
     """Methods have their labels, numbers their intervals, and small p-values no false digits."""
-    table = contrasts_table(_trials(settings), settings).head(1)
+    table = contrasts_table(_trials(conditions), conditions).head(1)
     names = ["difference", "low", "high", "sd_ratio", "sd_low", "sd_high", "fewer"]
     table[names] = [-4.0, -6.5, -1.255, 0.5, 0.25, 0.751, 0.8]
     table[["p_wilcoxon", "p_spread"]] = [0.00099, 0.04]
@@ -333,7 +334,7 @@ def test_readable_levels_are_of_one_claim() -> None:
 
 
 def test_readable_ablations_by_hand() -> None:
-    """A row a setting: mean with its interval, SD, median and how many trials are at the cap."""
+    """A row a condition: mean with its interval, SD, median and how many trials are at the cap."""
     table = pd.DataFrame(
         {
             "setting": ["default"],
@@ -399,10 +400,10 @@ def test_markdown_is_a_table() -> None:
     )
 
 
-def test_trials_of_other_tasks_are_kept(settings: dict[Key, Setting], tmp_path: Path) -> None:
+def test_trials_of_other_tasks_are_kept(conditions: dict[Key, Condition], tmp_path: Path) -> None:
     """Writing one task's trials replaces its own rows and no others; twice gives the same bytes."""
     path = tmp_path / "trials.csv"
-    trials = _trials(settings)
+    trials = _trials(conditions)
     other = trials.assign(task="other")
     write_trials(other, path)
     write_trials(trials.assign(iterations=1), path)
@@ -415,8 +416,8 @@ def test_trials_of_other_tasks_are_kept(settings: dict[Key, Setting], tmp_path: 
     assert (read[read["task"] == "small"]["iterations"] > 1).all()
 
 
-def test_missing_trials_are_an_error(settings: dict[Key, Setting]) -> None:
-    """A setting without rows is not an empty comparison."""
-    trials = _trials(settings)
+def test_missing_trials_are_an_error(conditions: dict[Key, Condition]) -> None:
+    """A condition without rows is not an empty comparison."""
+    trials = _trials(conditions)
     with pytest.raises(KeyError, match="no trials of unified"):
-        rows_of(trials[trials["method"] == "adaboost"], settings["unified", "printed"])
+        rows_of(trials[trials["method"] == "adaboost"], conditions["unified", "printed"])

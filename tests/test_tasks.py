@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from replication import Demos, Params, load_demos
-from replication.choices import ChoiceError
-from replication.envs.field import SoccerField
-from replication.envs.soccer import SoccerParams, SoccerWorld
-from replication.paper import SOCCER
-from replication.paths import PROJECT
-from replication.qlearning import stream
-from replication.setting import Setting
-from replication.tasks import MazeTask, SoccerTask, make_task
+from replication.envs.maze import as_maze
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import SoccerParams
+from replication.envs.soccer.world import SoccerWorld
+from replication.files import PROJECT
+from replication.learning.seeds import stream
+from replication.paper.published import SOCCER
+from replication.paper.register import ChoiceError
+from replication.trials.condition import Condition, make_agent
+from replication.trials.maze_agent import MazeAgent
+from replication.trials.soccer_agent import SoccerAgent
 
 
 @pytest.fixture(scope="module")
@@ -24,22 +27,22 @@ def soccer() -> Demos:
 
 def test_each_environment_has_its_task(small_demos: Demos, soccer: Demos) -> None:
     """A maze makes a maze task, a field a soccer task, anything else an error."""
-    assert isinstance(make_task(small_demos.environment, Params()), MazeTask)
-    assert isinstance(make_task(soccer.environment, Params.of(**SOCCER)), SoccerTask)
+    assert isinstance(make_agent(small_demos.environment, Params()), MazeAgent)
+    assert isinstance(make_agent(soccer.environment, Params.of(**SOCCER)), SoccerAgent)
     with pytest.raises(ChoiceError, match="no task for a str"):
-        make_task("chess", Params())  # type: ignore[arg-type]
+        make_agent("chess", Params())  # type: ignore[arg-type]
 
 
 def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
     """What the compiled maze learner cannot do is refused, not ignored."""
     with pytest.raises(ChoiceError, match=r"epsilon_end = 0\.3"):
-        make_task(small_demos.environment, Params.of(epsilon=0.3))
+        make_agent(small_demos.environment, Params.of(epsilon=0.3))
 
 
 def test_hits_in_mazes_are_the_moves_that_change_nothing(stored_demos: Demos) -> None:
     """A maze's episode moves by the table, and hits something just where it stays in place."""
-    maze = stored_demos.maze
-    task = make_task(maze, Params.of(horizon=60))
+    maze = as_maze(stored_demos.environment)
+    task = make_agent(maze, Params.of(horizon=60))
     rng = np.random.default_rng(1)
     seen: set[bool] = set()
     for seed in range(20):
@@ -61,7 +64,7 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: st
     """Where the plain world, given an episode's actions, counts more contacts, there is a hit."""
     assert isinstance(soccer.environment, SoccerField)
     field = replace(soccer.environment, params=SoccerParams(macro=macro, time_limit=60.0))
-    task = make_task(field, Params.of(**SOCCER))
+    task = make_agent(field, Params.of(**SOCCER))
     world = SoccerWorld(field.params)
     seen: set[bool] = set()
     for seed in range(4):
@@ -81,7 +84,7 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: st
 def test_soccer_trials_do_not_depend_on_each_other(soccer: Demos) -> None:
     """Two trials learned in one call have the bits of each learned alone."""
     params = Params.of(**{**SOCCER, "episodes": 3})
-    task = make_task(soccer.environment, params)
+    task = make_agent(soccer.environment, params)
     rng = np.random.default_rng(1)
     weights, q = rng.normal(size=(2, *task.shape)), np.zeros((2, *task.shape))
     streams = np.stack([stream(np.random.SeedSequence(k)) for k in range(2)])
@@ -96,10 +99,10 @@ def test_soccer_goal_value_matters(soccer: Demos) -> None:
     """GOAL-VALUE bootstrap changes what is learned where a goal falls, and nothing before."""
     tables = []
     for goal_value in ("zero", "bootstrap"):
-        setting = Setting(soccer, "unified", Params.of(**SOCCER, goal_value=goal_value))
+        condition = Condition(soccer, "unified", Params.of(**SOCCER, goal_value=goal_value))
         (correct,) = soccer.correct
-        weights = np.zeros((1, *setting.task.shape))
+        weights = np.zeros((1, *condition.agent.shape))
         weights[0, correct.states[:-1], correct.actions] = 1.0
         words = stream(np.random.SeedSequence(2))[None]
-        tables.append(setting.task.learn(weights, np.zeros_like(weights), words)[0])
+        tables.append(condition.agent.learn(weights, np.zeros_like(weights), words)[0])
     assert not np.array_equal(tables[0], tables[1])

@@ -11,22 +11,24 @@ import pandas as pd
 import pytest
 
 from replication import Demos
-from replication import compute as compute_module
-from replication.demos import content_hash
+from replication.demos.model import content_hash
 from replication.irl import Trial, run
-from replication.params import Params
-from replication.seeds import trial_seeds
-from replication.setting import Setting
-from replication.store import Store
-from replication.tasks import Task
-from replication.trials import TRACED_TRIAL, Results, WorkerError, digest, run_trials, trial_key
+from replication.irl.agent import Agent
+from replication.learning.seeds import trial_seeds
+from replication.paper.params import Params
+from replication.trials import compute as compute_module
+from replication.trials.compute import TRACED_TRIAL, trial_key
+from replication.trials.condition import Condition
+from replication.trials.results import Results, digest
+from replication.trials.run import WorkerError, run_trials
+from replication.trials.store import Store
 
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
 
 
-def _settings(demos: Demos) -> list[Setting]:
+def _settings(demos: Demos) -> list[Condition]:
     return [
-        Setting(demos, method, Params.of(**FEW))
+        Condition(demos, method, Params.of(**FEW))
         for method in ("adaboost", "unified", "unified-incorrect")
     ]
 
@@ -38,9 +40,9 @@ def _run(demos: Demos, path: Path, *, jobs: int = 1, trials: int = 4, seed: int 
 def _bits(results: Results) -> list[bytes]:
     return [
         array.tobytes()
-        for setting in results.settings
+        for condition in results.conditions
         for k in range(results.trials)
-        for trial in [results.trial(setting, k)]
+        for trial in [results.trial(condition, k)]
         for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
     ]
 
@@ -63,54 +65,54 @@ def test_a_trial_does_not_depend_on_how_many_there_are(small_demos: Demos, tmp_p
 def test_settings_that_share_a_task_are_computed_together(
     small_demos: Demos, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In one chunk with those of other settings, a trial has the bits that it has alone."""
-    settings = [
+    """In one chunk with those of other conditions, a trial has the bits that it has alone."""
+    conditions = [
         *_settings(small_demos),
-        Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 3})),
+        Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 3})),
     ]
     chunks: list[int] = []
 
-    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
         chunks.append(len(loops))
         return run(task, loops)
 
     monkeypatch.setattr(compute_module, "run", spy)
-    together = run_trials(settings, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
-    assert chunks == [3 * len(settings)]
-    for number, setting in enumerate(settings):
+    together = run_trials(conditions, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
+    assert chunks == [3 * len(conditions)]
+    for number, condition in enumerate(conditions):
         path = tmp_path / f"{number}.sqlite"
         for trials in (1, 2, 3):  # so that each is computed in a run of its own
-            alone = run_trials([setting], trials=trials, store=Store(path), seed=5)
-        together.settings = [setting]
+            alone = run_trials([condition], trials=trials, store=Store(path), seed=5)
+        together.conditions = [condition]
         assert _bits(alone) == _bits(together)
-    assert chunks[1:] == [1] * 3 * len(settings)
+    assert chunks[1:] == [1] * 3 * len(conditions)
 
 
 def test_settings_of_other_tasks_are_computed_apart(
     small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What learns by other parameters, or rolls out by them, shares no chunk."""
-    settings = [
-        Setting(small_demos, "unified", Params.of(**FEW, ties=ties, rollout_ties=rollout_ties))
+    conditions = [
+        Condition(small_demos, "unified", Params.of(**FEW, ties=ties, rollout_ties=rollout_ties))
         for ties, rollout_ties in (("random", "random"), ("first", "random"), ("random", "first"))
     ]
-    tasks: list[Task] = []
+    tasks: list[Agent] = []
 
-    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
         tasks.append(task)
         return run(task, loops)
 
     monkeypatch.setattr(compute_module, "run", spy)
-    run_trials(settings, trials=2, store=Store(store_path), seed=5)
-    assert tasks == [setting.task for setting in settings]
+    run_trials(conditions, trials=2, store=Store(store_path), seed=5)
+    assert tasks == [condition.agent for condition in conditions]
 
 
 def test_settings_know_the_hash_of_what_they_select(small_demos: Demos) -> None:
     """The hash in a trial's key is that of the demonstrations that the method is given."""
     for incorrect in ("none", "hit", "all"):
         for method in ("adaboost", "unified", "unified-incorrect"):
-            setting = Setting(small_demos, method, Params.of(incorrect=incorrect))
-            assert setting.selected_hash == content_hash(setting.selected)
+            condition = Condition(small_demos, method, Params.of(incorrect=incorrect))
+            assert condition.selected_hash == content_hash(condition.selected)
 
 
 def test_finished_trials_are_not_computed_again(
@@ -120,11 +122,11 @@ def test_finished_trials_are_not_computed_again(
     first = _run(small_demos, store_path)
     computed: list[list[int]] = []
 
-    def spy(self: Setting, *, seed: np.random.SeedSequence, keep: bool = False) -> None:
+    def spy(self: Condition, *, seed: np.random.SeedSequence, keep: bool = False) -> None:
         computed.append(list(seed.spawn_key))
         raise AssertionError("a finished trial was computed again")
 
-    monkeypatch.setattr(Setting, "trial", spy)
+    monkeypatch.setattr(Condition, "trial", spy)
     assert _bits(_run(small_demos, store_path)) == _bits(first)
     assert computed == []
     with pytest.raises(AssertionError):
@@ -150,14 +152,14 @@ def test_frame_has_one_row_a_trial(small_demos: Demos, store_path: Path) -> None
     assert len(frame) == 12
     assert not frame.duplicated(["method", "trial"]).any()
     assert set(frame["choices"]) == {"EPISODES=60 HORIZON=40 ITERATION-CAP=40"}
-    setting = results.settings[0]
-    assert frame["iterations"].tolist()[:4] == results.iterations(setting).tolist()
+    condition = results.conditions[0]
+    assert frame["iterations"].tolist()[:4] == results.iterations(condition).tolist()
 
 
 def test_errors_are_filled_up_with_their_last(small_demos: Demos, store_path: Path) -> None:
     """Error curves of unequal length keep the last error: zero if converged, else not."""
     short, long = (
-        Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": cap}))
+        Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": cap}))
         for cap in (2, 40)
     )
     results = run_trials([short, long], trials=3, store=Store(store_path), seed=5)
@@ -170,59 +172,59 @@ def test_errors_are_filled_up_with_their_last(small_demos: Demos, store_path: Pa
 
 def test_a_capped_trial_is_marked(small_demos: Demos, store_path: Path) -> None:
     """A trial that ended at the cap is in the table with the cap, and not converged."""
-    capped = Setting(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 2}))
+    capped = Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 2}))
     frame = run_trials([capped], trials=2, store=Store(store_path), seed=5).frame()
     assert frame["converged"].tolist() == [False, False]
     assert frame["iterations"].tolist() == [2, 2]
 
 
 def test_only_the_declared_trial_keeps_snapshots(small_demos: Demos, store_path: Path) -> None:
-    """FIG5-TRIAL: one trial of a setting keeps every iteration, the others their result."""
+    """FIG5-TRIAL: one trial of a condition keeps every iteration, the others their result."""
     results = _run(small_demos, store_path)
     for k in range(results.trials):
-        trial = results.trial(results.settings[0], k, snapshots=True)
+        trial = results.trial(results.conditions[0], k, snapshots=True)
         assert (trial.snapshots is not None) == (k == TRACED_TRIAL)
 
 
 def test_key_changes_with_everything_that_matters(small_demos: Demos) -> None:
     """Method, parameters, used demonstrations, root and trial each give another key."""
-    setting = Setting(small_demos, "unified-incorrect", Params.of(incorrect="all"))
+    condition = Condition(small_demos, "unified-incorrect", Params.of(incorrect="all"))
     shorter = replace(small_demos, incorrect=small_demos.incorrect[1:])
     keys = [
-        trial_key(setting, 1, 0),
-        trial_key(setting, 1, 1),
-        trial_key(setting, 2, 0),
-        trial_key(replace(setting, method="unified"), 1, 0),
-        trial_key(replace(setting, params=Params.of(alpha=0.1)), 1, 0),
-        trial_key(replace(setting, params=Params.of(incorrect="opposite")), 1, 0),
-        trial_key(replace(setting, demos=shorter), 1, 0),
+        trial_key(condition, 1, 0),
+        trial_key(condition, 1, 1),
+        trial_key(condition, 2, 0),
+        trial_key(replace(condition, method="unified"), 1, 0),
+        trial_key(replace(condition, params=Params.of(alpha=0.1)), 1, 0),
+        trial_key(replace(condition, params=Params.of(incorrect="opposite")), 1, 0),
+        trial_key(replace(condition, demos=shorter), 1, 0),
     ]
     assert len(set(keys)) == len(keys)
 
 
 def test_key_ignores_what_does_not_matter(small_demos: Demos) -> None:
     """A new description, or incorrect demonstrations that the method never sees, change nothing."""
-    setting = Setting(small_demos, "unified", Params())
+    condition = Condition(small_demos, "unified", Params())
     described = replace(small_demos, description="other words", incorrect=())
-    same = Setting(described, "unified", Params.of(incorrect="none"))
-    assert trial_key(setting, 1, 0) == trial_key(same, 1, 0)
+    same = Condition(described, "unified", Params.of(incorrect="none"))
+    assert trial_key(condition, 1, 0) == trial_key(same, 1, 0)
 
 
 def test_methods_share_their_seeds(small_demos: Demos, store_path: Path) -> None:
     """Paired comparison: trial k of every method starts from the same first trajectory."""
     results = _run(small_demos, store_path)
     first = {
-        tuple(results.trial(setting, k).errors[0] for k in range(results.trials))
-        for setting in results.settings
+        tuple(results.trial(condition, k).errors[0] for k in range(results.trials))
+        for condition in results.conditions
     }
     assert len(first) == 1
     assert len(set(next(iter(first)))) > 1
 
 
 def test_equal_settings_are_run_once(small_demos: Demos, store_path: Path) -> None:
-    """A setting that is given twice appears once in the results."""
-    setting = Setting(small_demos, "unified", Params.of(**FEW))
-    results = run_trials([setting, setting], trials=2, store=Store(store_path), seed=1)
+    """A condition that is given twice appears once in the results."""
+    condition = Condition(small_demos, "unified", Params.of(**FEW))
+    results = run_trials([condition, condition], trials=2, store=Store(store_path), seed=1)
     assert len(results.frame()) == 2
 
 
@@ -242,8 +244,9 @@ def test_a_killed_run_goes_on_from_the_store(
     small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What a run that broke off had finished is not computed again."""
-    settings = [
-        Setting(small_demos, "unified", Params.of(**FEW, ties=ties)) for ties in ("random", "first")
+    conditions = [
+        Condition(small_demos, "unified", Params.of(**FEW, ties=ties))
+        for ties in ("random", "first")
     ]
     computed: list[int] = []
     put = Store.put
@@ -256,15 +259,15 @@ def test_a_killed_run_goes_on_from_the_store(
 
     monkeypatch.setattr(Store, "put", fail)
     with pytest.raises(KeyboardInterrupt):
-        run_trials(settings, trials=2, store=Store(store_path), seed=5)
+        run_trials(conditions, trials=2, store=Store(store_path), seed=5)
     monkeypatch.setattr(Store, "put", put)
 
-    def spy(task: Task, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
         computed.append(len(loops))
         return run(task, loops)
 
     monkeypatch.setattr(compute_module, "run", spy)
-    run_trials(settings, trials=2, store=Store(store_path), seed=5)
+    run_trials(conditions, trials=2, store=Store(store_path), seed=5)
     assert computed == [2, 2]
 
 
@@ -272,11 +275,11 @@ def test_a_worker_with_other_code_is_refused(
     small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Trials whose keys nobody asked for are not stored."""
-    setting = Setting(small_demos, "unified", Params.of(**FEW))
-    key = trial_key(setting, 5, 0)
+    condition = Condition(small_demos, "unified", Params.of(**FEW))
+    key = trial_key(condition, 5, 0)
     monkeypatch.setattr(compute_module, "trial_key", lambda *_, **__: "other")
     with pytest.raises(WorkerError, match=r"environment\.lock"):
-        run_trials([setting], trials=1, store=Store(store_path), seed=5)
+        run_trials([condition], trials=1, store=Store(store_path), seed=5)
     assert not Store(store_path).known(["other", key])
 
 
@@ -309,8 +312,8 @@ def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
 
 def test_digests_are_those_of_the_store(small_demos: Demos, store_path: Path) -> None:
     """What was computed and what is read back have one digest, so either can be verified."""
-    setting = _settings(small_demos)[1]
-    ((key, trial),) = compute_module.compute(setting.task, [(setting, 1)], 5)
+    condition = _settings(small_demos)[1]
+    ((key, trial),) = compute_module.compute(condition.agent, [(condition, 1)], 5)
     _run(small_demos, store_path)
     assert digest(Store(store_path).get(key)) == digest(trial)
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from replication.irl import unified
-from replication.params import Update
+from replication.paper.params import Update
 
 # A row of four pairs: the agent alone, the expert earlier, the expert alone, both at one time.
 # (Fig. 2 of the paper draws such a row, but with visits that cannot all occur in one trajectory:

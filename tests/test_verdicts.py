@@ -10,9 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from replication.claims import Claim, Claims, Judging, claims, criteria_hash
-from replication.statistics import compare, holm, mean_prediction, sd_prediction, share_interval
-from replication.verdicts import (
+from replication.evidence.claims import Claim, Claims, Judging, criteria_hash, load_claims
+from replication.evidence.statistics import (
+    compare,
+    holm,
+    mean_prediction,
+    sd_prediction,
+    share_interval,
+)
+from replication.evidence.verdicts import (
     NOT_REPRODUCED,
     NOT_TESTABLE,
     PARTLY,
@@ -75,7 +81,7 @@ def pair(x: ArrayLike, y: ArrayLike, measure: str = "iterations") -> pd.DataFram
 
 def judge(measures: pd.DataFrame, *judged: Claim) -> pd.DataFrame:
     """Judge claims by the numbers of the frozen file."""
-    judging = claims().judging
+    judging = load_claims().judging
     return judge_claims(measures, Claims(judging=judging, explored=(), claim=judged))
 
 
@@ -291,7 +297,7 @@ def whole() -> pd.DataFrame:
     rng = np.random.default_rng(5)
     parts = []
     means = {"adaboost": 45, "unified": 40, "unified-incorrect": 36}
-    for task, n in claims().judging.trials.items():
+    for task, n in load_claims().judging.trials.items():
         for method, mean in means.items():
             for f in ("",) if method == "adaboost" else ("printed", "updated"):
                 measured: dict[str, Any] = {name: rng.normal(0.5, 1.0, n) for name in MEASURES}
@@ -304,18 +310,18 @@ def whole() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def judged(whole: pd.DataFrame) -> pd.DataFrame:
     """Judge all claims of the frozen file by made-up measures."""
-    return judge_claims(whole, claims())
+    return judge_claims(whole, load_claims())
 
 
 def test_every_claim_has_a_row_for_each_reading(judged: pd.DataFrame) -> None:
     """Rows stand in the order of the file; a method without a trace has one."""
     due = [
         (one.id, f)
-        for one in claims().claim
+        for one in load_claims().claim
         for f in (("",) if one.x == "adaboost" else ("printed", "updated"))
     ]
     assert list(judged[["id", "F"]].itertuples(index=False, name=None)) == due
-    assert [id for id, _ in by_claim(judged)] == [one.id for one in claims().claim]
+    assert [id for id, _ in by_claim(judged)] == [one.id for one in load_claims().claim]
     assert set(judged["verdict"]) <= set(VERDICTS)
     assert set(judged["criteria"]) == {criteria_hash()}
     assert set(judged[judged["id"] == "MEAN-ADABOOST-OPEN"]["verdict"]) == {NOT_TESTABLE}
@@ -352,12 +358,12 @@ def test_effects_are_those_of_the_comparison(judged: pd.DataFrame, whole: pd.Dat
 def test_order_of_the_rows_changes_nothing(judged: pd.DataFrame, whole: pd.DataFrame) -> None:
     """The measures may stand in any order: trials are paired by their number."""
     shuffled = whole.sample(frac=1.0, random_state=3)
-    pd.testing.assert_frame_equal(judge_claims(shuffled, claims()), judged)
+    pd.testing.assert_frame_equal(judge_claims(shuffled, load_claims()), judged)
 
 
 def test_trials_may_be_exchanged_together(whole: pd.DataFrame) -> None:
     """If all methods' trials are numbered anew in the same way, no effect and no test changes."""
-    one = claims().by_id
+    one = load_claims().by_id
     some = [one("SAVES-OPEN"), one("STEADIER"), one("MEAN-INCORRECT-OPEN"), one("ZERO-OPEN")]
     own = whole[whole["task"] == "open-maze"]
     order = np.random.default_rng(8).permutation(100)
@@ -449,7 +455,7 @@ def test_decision_mirrors(one: float, other: float, p: float) -> None:
 
 def test_frozen_numbers_judge() -> None:
     """The level and the fewest trials are those of the file that is given, not fixed."""
-    lax = Judging.model_validate({**claims().judging.model_dump(), "fewest": 5, "level": 0.5})
+    lax = Judging.model_validate({**load_claims().judging.model_dump(), "fewest": 5, "level": 0.5})
     difference = np.array([-1.0] * 6 + [0.5] * 2)
     measures = pair(40 + difference, np.full(8, 40.0))
     one = Claims(judging=lax, explored=(), claim=(faster(),))

@@ -13,19 +13,15 @@ import pandas as pd
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
-from replication import Demos, provenance, save_demos, verification
-from replication.choices import register
-from replication.comparisons import EXPERIMENTS, Experiment
-from replication.compute import trial_key
-from replication.files import write_file
-from replication.params import Params
-from replication.paths import PROJECT
-from replication.runs import prepare
-from replication.setting import Setting
-from replication.store import Store
-from replication.tables import write_trials
-from replication.trials import run_trials
-from replication.verification import (
+from replication import Demos, save_demos
+from replication.evidence.experiments import EXPERIMENTS, Experiment
+from replication.evidence.tables import write_trials
+from replication.files import PROJECT, write_file
+from replication.paper.params import Params
+from replication.paper.register import load_choices
+from replication.pipeline import provenance
+from replication.pipeline.plan import prepare
+from replication.pipeline.verify import (
     sampled_trials,
     setting_of,
     verify,
@@ -34,6 +30,10 @@ from replication.verification import (
     verify_packages,
     verify_trials,
 )
+from replication.trials.compute import trial_key
+from replication.trials.condition import Condition
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 INPUTS: dict[str, Any] = {"parameters": {}, "data": {}, "source": {}}
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
@@ -46,10 +46,10 @@ def out(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -> 
     """Return a folder with the trials.csv of a small task, and its store beside it."""
     save_demos(small_demos, tmp_path / "small.json")
     experiment = Experiment(str(tmp_path / "small.json"), FEW, ("adaboost", "unified"))
-    monkeypatch.setattr(verification, "EXPERIMENTS", {"small": experiment})
-    monkeypatch.setattr(verification, "EVERY", 3)
-    settings = list(experiment.settings().values())
-    results = run_trials(settings, trials=TRIALS, store=Store(tmp_path / "s.sqlite"), seed=4)
+    monkeypatch.setattr(verify, "EXPERIMENTS", {"small": experiment})
+    monkeypatch.setattr(verify, "EVERY", 3)
+    conditions = list(experiment.conditions().values())
+    results = run_trials(conditions, trials=TRIALS, store=Store(tmp_path / "s.sqlite"), seed=4)
     (tmp_path / "out").mkdir()
     write_trials(results.frame(), tmp_path / "out" / "trials.csv")
     return tmp_path / "out"
@@ -86,7 +86,7 @@ def test_outputs_are_held_against_the_manifest(tmp_path: Path) -> None:
 
 def test_what_changed_since_is_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Outputs that are whole, but of other inputs than those of now, are named."""
-    monkeypatch.setattr("replication.paths.PROJECT", tmp_path)
+    monkeypatch.setattr("replication.files.PROJECT", tmp_path)
     (tmp_path / "environment.lock").touch()
     cells = [new_code_cell('out = "x"\ntrials = 3', metadata={"tags": ["parameters"]})]
     node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
@@ -180,7 +180,7 @@ def test_a_damaged_file_is_one_line(out: Path, content: bytes, said: str) -> Non
 
 @pytest.mark.parametrize("choices", ["NO-CHOICE=1", "EPISODES=many", "ALPHA", "MAP-OPEN=x"])
 def test_a_row_that_means_nothing_is_found(out: Path, choices: str) -> None:
-    """A row that no setting belongs to is named, and the others are computed."""
+    """A row that no condition belongs to is named, and the others are computed."""
     table = pd.read_csv(out / "trials.csv", keep_default_na=False)
     table.loc[0, "choices"] = choices
     table.to_csv(out / "trials.csv", index=False)
@@ -192,8 +192,8 @@ def test_a_changed_stored_trial_is_found(out: Path) -> None:
     """One bit of a stored result, or a record that cannot be read, is found."""
     store = Store(out.parent / "s.sqlite")
     row = next(sampled_trials(out).itertuples())
-    setting = setting_of(row.task, row.method, row.choices)
-    key = trial_key(setting, row.seed, row.trial)
+    condition = setting_of(row.task, row.method, row.choices)
+    key = trial_key(condition, row.seed, row.trial)
     trial = store.get(key)
     weights = trial.weights.copy()
     weights[0, 0] = np.nextafter(weights[0, 0], 1)
@@ -221,24 +221,24 @@ def test_rows_of_other_tasks_are_left_out(out: Path) -> None:
 
 def test_one_trial_in_twenty_is_sampled() -> None:
     """The sample is 5 %."""
-    assert verification.EVERY == 20
+    assert verify.EVERY == 20
 
 
-# --- the settings behind rows ----------------------------------------------------------------
+# --- the conditions behind rows ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("task", list(EXPERIMENTS))
 def test_settings_of_the_experiments_come_back(task: str) -> None:
-    """A row of trials.csv has all that is needed to make its setting again."""
-    for setting in EXPERIMENTS[task].settings().values():
-        again = setting_of(setting.demos.task, setting.method, setting.choices)
-        assert trial_key(again, 1, 0) == trial_key(setting, 1, 0)
-        assert again.params == setting.params
+    """A row of trials.csv has all that is needed to make its condition again."""
+    for condition in EXPERIMENTS[task].conditions().values():
+        again = setting_of(condition.demos.task, condition.method, condition.choices)
+        assert trial_key(again, 1, 0) == trial_key(condition, 1, 0)
+        assert again.params == condition.params
 
 
 FIELDS = {
     entry.field.split(".")[1]: entry
-    for entry in register().values()
+    for entry in load_choices().values()
     if entry.field and entry.field.split(".")[1] in Params().values()
 }
 
@@ -253,12 +253,12 @@ def test_every_value_of_a_choice_comes_back(name: str) -> None:
         values = [low, high, low + (high - low) / 3]
         if isinstance(entry.default, int):
             values = [int(low), int(high), int(low) + 1]
-    demos = EXPERIMENTS["open-maze"].settings()["unified", "printed"].demos
+    demos = EXPERIMENTS["open-maze"].conditions()["unified", "printed"].demos
     for value in values:
-        setting = Setting(demos, "unified", Params.of(**{name: value}))
-        again = setting_of("open-maze", "unified", setting.choices)
-        assert again.params == setting.params
-        assert again.choices == setting.choices
+        condition = Condition(demos, "unified", Params.of(**{name: value}))
+        again = setting_of("open-maze", "unified", condition.choices)
+        assert again.params == condition.params
+        assert again.choices == condition.choices
 
 
 # --- all together ----------------------------------------------------------------------------
@@ -266,7 +266,7 @@ def test_every_value_of_a_choice_comes_back(name: str) -> None:
 
 def test_everything_is_checked_and_told(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines say what is being done, and all that is wrong comes back."""
-    monkeypatch.setattr(verification, "PROJECT", out.parent)
+    monkeypatch.setattr(verify, "PROJECT", out.parent)
     (out.parent / "environment.lock").write_text("numpy==0.1\n")
     told: list[str] = []
     found = verify([], out, out.parent / "s.sqlite", jobs=1, echo=told.append)

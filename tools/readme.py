@@ -13,10 +13,8 @@ from typing import Any
 
 import pandas as pd
 
-from replication.claims import claims
-from replication.files import write_file
-from replication.paths import PROJECT
-from replication.sensitivity import (
+from replication.evidence.claims import load_claims
+from replication.evidence.sensitivity import (
     HOLDS,
     UNDEFINED,
     chance,
@@ -25,15 +23,16 @@ from replication.sensitivity import (
     outcome_shares,
     variance_shares,
 )
-from replication.specifications import declared, factorial_specifications
-from replication.tables import markdown, read_table, readable_verdicts
-from replication.verdicts import NOT_TESTABLE, REPRODUCED, overall
+from replication.evidence.specifications import factorial_specifications, load_specifications
+from replication.evidence.tables import markdown, read_table, readable_verdicts
+from replication.evidence.verdicts import NOT_TESTABLE, REPRODUCED, overall
+from replication.files import PROJECT, write_file
 
 BLOCK = "<!-- {}: written by `make readme` from figures/, checked by the tests -->\n"
 END = "<!-- end of {} -->\n"
 
 WIDTH = 100
-FACTORIAL = factorial_specifications(declared().mazes.factorial)
+FACTORIAL = factorial_specifications(load_specifications().mazes.factorial)
 OPPOSITE = ("opposite", "hit+detour+opposite", "all")
 """Those values of INCORRECT-KINDS that have the opposite direction among them."""
 
@@ -62,7 +61,7 @@ def results() -> str:
 
 def _holding(id: str) -> str:
     """Say in how many specifications a claim holds on its own map; in soccer, of single changes."""
-    claim = claims().by_id(id)
+    claim = load_claims().by_id(id)
     if claim.task == "soccer":
         effects = read("sensitivity_soccer")
         own = effects[effects["claim"] == id]
@@ -70,7 +69,7 @@ def _holding(id: str) -> str:
         effects = read("sensitivity_factorial")
         same = {
             one.id
-            for one in claims().claim
+            for one in load_claims().claim
             if (one.measure, one.statistic, one.x, one.y)
             == (claim.measure, claim.statistic, claim.x, claim.y)
         }
@@ -96,7 +95,7 @@ def _published(judged: pd.DataFrame) -> str:
         f"Of the {len(tested)} published means, SDs and single runs that could be tested, "
         f"{tested.count(REPRODUCED)} are reproduced under both readings; "
         "[all verdicts](figures/claims.md), with the numbers in "
-        f"[`claims.csv`](figures/claims.csv), from root seed {claims().judging.root_seed}, which "
+        f"[`claims.csv`](figures/claims.csv), from root seed {load_claims().judging.root_seed}, which "
         "was used for nothing else before."
     )
 
@@ -128,7 +127,7 @@ def baseline() -> str:
     r1 = levels("FASTER", "ADABOOST-RULE", "mismatch")
     rules = {name: ablation(f"AdaBoost-IRL, {name}") for name in ("mismatch", "vote", "graded")}
     far = {name: ablation(f"AdaBoost-IRL, {name}") for name in ("confidence", "log-odds")}
-    paper = claims().by_id("FASTER")
+    paper = load_claims().by_id("FASTER")
     means = ", ".join(f"*{name}* has {_mean(one)}" for name, one in far.items())
     whole, part = share("FASTER", "ADABOOST-RULE"), share("FASTER", "ADABOOST-RULE", caps=False)
     return (
@@ -237,7 +236,7 @@ def motions() -> str:
         ("soccer", "in soccer"),
     ):
         found = [same_motions(trials, task, f) for f in ("printed", "updated")]
-        n = claims().judging.trials[task]  # type: ignore[index]
+        n = load_claims().judging.trials[task]  # type: ignore[index]
         same.append(f"{found[0]} and {found[1]} of {n} trials {where}")
     open_maze = [_effect(row("AVOIDS-OPEN", f)) for f in ("printed", "updated")]
     return (
@@ -341,10 +340,10 @@ def sets(maze: str, kinds: str, f: str) -> str:
     return _saved(own["difference"], own["low"], own["high"])
 
 
-def ablation(setting: str) -> Any:
-    """Return the row of a setting among the ablations."""
+def ablation(condition: str) -> Any:
+    """Return the row of a condition among the ablations."""
     table = read("ablations")
-    return next(table[table["setting"] == setting].itertuples())
+    return next(table[table["setting"] == condition].itertuples())
 
 
 def counts(id: str) -> Any:

@@ -1,9 +1,9 @@
-"""Mazes drawn as text: one table of moves, and a Gymnasium environment on top of it.
+"""Mazes drawn as text: a map and its table of moves.
 
 A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
 edge of the map is a wall that is not drawn (choice WALLS). A move into an obstacle or off the map
-stays in place (choice BUMP). The table `Maze.next_state` is all there is to the dynamics: `MazeEnv`
-and the compiled learner both read it, so they cannot disagree.
+stays in place (choice BUMP). The table `Maze.next_state` is all there is to the dynamics: the
+learners and the Gymnasium environment in :mod:`replication.envs.gym` both read it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
-import gymnasium
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-__all__ = ["ACTIONS", "Maze", "MazeEnv", "MazeError"]
+from replication.envs.environment import Environment
+from replication.errors import UserError
 
 ACTIONS = ("up", "down", "right", "left")
 """The names of the actions 0..3, in the paper's order."""
@@ -27,17 +27,12 @@ MAX_SIDE = 1_000
 MAX_CELLS = 100_000
 
 _MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1))  # (row, column) of each action
-_SMALL_MAP = ("....G", ".##..", ".....", "..##.", "S....")
-_PIXELS = 8  # side of a cell in an RGB image
-_COLOURS = {".": (255, 255, 255), "#": (64, 64, 64), "S": (158, 202, 225), "G": (161, 217, 155)}
-_AGENT_COLOUR = (214, 39, 40)
-
 
 _Array = TypeVar("_Array", bound=NDArray[Any])
 
 
-class MazeError(ValueError):
-    """A map that is not a maze; the message is one line that names the place and the mend."""
+class MazeError(UserError):
+    """A map that is not a maze; the message is one line, with the place and the fix."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +87,11 @@ class Maze:
     def from_text(cls, text: str) -> Maze:
         """Read a maze from text, one line a row; blank margins around the map are ignored."""
         return cls(tuple(line.strip() for line in text.strip().splitlines()))
+
+    @property
+    def kind(self) -> str:
+        """What kind of environment this is."""
+        return "maze"
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -191,20 +191,10 @@ class Maze:
         at_goal = np.flatnonzero(self.replay(actions) == self.goal)
         return int(at_goal[0]) if at_goal.size else None
 
-    @property
-    def aim(self) -> str:
-        """The goal in words."""
-        return f"the goal [{','.join(map(str, self.cell(self.goal)))}]"
-
-    @property
-    def stay(self) -> str:
-        """What a move that changes nothing means."""
-        return "hits a wall and stays"
-
     def describe(self) -> dict[str, Any]:
         """Return the maze as plain JSON values."""
         return {
-            "kind": "maze",
+            "kind": self.kind,
             "map": list(self.rows),
             "actions": list(self.actions),
             "start": list(self.cell(self.start)),
@@ -229,98 +219,19 @@ class Maze:
         return _read_only(np.array(distance, dtype=np.int64))
 
 
-class MazeEnv(gymnasium.Env[Any, Any]):
-    """A maze as a Gymnasium environment, registered as ``replication/Maze-v0``.
-
-    Observations are states, actions the numbers of `ACTIONS`. An episode starts at the start and
-    terminates at the goal; truncation is left to Gymnasium's ``TimeLimit`` (500 steps when made
-    through the registry).
-
-    Parameters
-    ----------
-    maze
-        A `Maze` or the rows of one; a small built-in maze by default.
-    weights
-        Reward R(s, a) of taking action a in state s, float [state, action]; 0 by default.
-    render_mode
-        "ansi": the map as text with the agent as ``@``; "rgb_array": uint8 [height, width, 3].
+def as_maze(environment: Environment) -> Maze:
+    """Return an environment that has to be a maze.
 
     Raises
     ------
     MazeError
-        If the map is not a maze.
-    ValueError
-        If the weights have another shape or are not finite, or the render mode is unknown.
-
-    Examples
-    --------
-    >>> env = gymnasium.make("replication/Maze-v0", maze=["S.G"])
-    >>> env.reset(seed=1)
-    (0, {})
-    >>> env.step(ACTIONS.index("right"))
-    (1, 0.0, False, False, {})
-    >>> env.step(ACTIONS.index("right"))
-    (2, 0.0, True, False, {})
+        If it is of another kind.
     """
-
-    # Gymnasium declares this as an instance variable, so it cannot be a ClassVar here.
-    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 10}  # noqa: RUF012
-
-    def __init__(
-        self,
-        maze: Maze | Sequence[str] = _SMALL_MAP,
-        weights: ArrayLike | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        self.maze = maze if isinstance(maze, Maze) else Maze(tuple(maze))
-        self.weights = _checked_weights(self.maze, weights)
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"unknown render mode {render_mode!r}; known: ansi, rgb_array")
-        self.render_mode = render_mode
-        self.observation_space = gymnasium.spaces.Discrete(self.maze.n_states)
-        self.action_space = gymnasium.spaces.Discrete(self.maze.n_actions)
-        self._state: int | None = None
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[int, dict[str, Any]]:
-        """Go to the start; the environment draws nothing from its seed."""
-        super().reset(seed=seed)
-        self._state = self.maze.start
-        return self._state, {}
-
-    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Take one action; returns (state, reward, terminated, truncated, info)."""
-        if self._state is None:
-            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
-        if not self.action_space.contains(action):
-            raise gymnasium.error.InvalidAction(f"there is no action {action!r}; actions are 0..3")
-        reward = self.weights.item(self._state, action)
-        self._state = self.maze.next_state.item(self._state, action)
-        return self._state, reward, self._state == self.maze.goal, False, {}
-
-    def render(self) -> Any:
-        """Draw the maze and the agent; None without a render mode."""
-        if self.render_mode == "ansi":
-            return self._text()
-        if self.render_mode == "rgb_array":
-            return self._image()
-        return None
-
-    def _text(self) -> str:
-        rows = [list(row) for row in self.maze.rows]
-        if self._state is not None:
-            row, column = self.maze.cell(self._state)
-            rows[row][column] = "@"
-        return "\n".join("".join(row) for row in rows) + "\n"
-
-    def _image(self) -> NDArray[np.uint8]:
-        cells = [[_COLOURS[character] for character in row] for row in self.maze.rows]
-        image = np.array(cells, dtype=np.uint8).repeat(_PIXELS, axis=0).repeat(_PIXELS, axis=1)
-        if self._state is not None:
-            top, left = (_PIXELS * index + 2 for index in self.maze.cell(self._state))
-            image[top : top + _PIXELS - 4, left : left + _PIXELS - 4] = _AGENT_COLOUR
-        return image
+    if not isinstance(environment, Maze):
+        raise MazeError(
+            f"a maze is needed here, but this environment is of kind {environment.kind!r}"
+        )
+    return environment
 
 
 def _checked_rows(rows: Sequence[str]) -> tuple[str, ...]:
@@ -341,7 +252,7 @@ def _checked_rows(rows: Sequence[str]) -> tuple[str, ...]:
                 "make all lines equally long"
             )
         for column, character in enumerate(row):
-            if character not in _COLOURS:
+            if character not in ".#SG":
                 raise MazeError(
                     f"unknown character {character!r} at {_place(index, column)}; "
                     "use '.' free, '#' obstacle, 'S' start, 'G' goal"
@@ -361,16 +272,6 @@ def _checked_rows(rows: Sequence[str]) -> tuple[str, ...]:
                 f"{places[1]}; keep one"
             )
     return rows
-
-
-def _checked_weights(maze: Maze, weights: ArrayLike | None) -> NDArray[np.float64]:
-    shape = (maze.n_states, maze.n_actions)
-    array = np.zeros(shape) if weights is None else np.array(weights, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"weights have shape {array.shape}; this maze needs {shape}")
-    if not np.isfinite(array).all():
-        raise ValueError("weights must be finite; replace NaN and infinity")
-    return _read_only(array)
 
 
 def _place(row: int, column: int) -> str:

@@ -2,7 +2,7 @@
 
 A trial is a generator: it yields the reward weights from which Q is to be learned and is sent the
 learned table. So the loop reads as the listings do, one trial at a time, while :func:`run` collects
-the requests of many trials and lets the task learn them together.
+the requests of many trials and lets the agent learn them together.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.expectations import feature_expectations
+from replication.irl.agent import Agent, Episode
+from replication.irl.expectations import feature_expectations, norm
 from replication.irl.methods import Method
-from replication.params import Params
-from replication.qlearning import stream
-from replication.seeds import child
-from replication.tasks import Episode, Task
+from replication.learning.seeds import child, stream
+from replication.paper.params import Params
 
 Array = NDArray[np.float64]
 
@@ -90,7 +89,7 @@ class Trial:
 
 
 def iterate(
-    task: Task,
+    agent: Agent,
     method: Method,
     mu_e: Array,
     mu_b: NDArray[np.bool_],
@@ -103,7 +102,7 @@ def iterate(
 
     Parameters
     ----------
-    task
+    agent
         Rolls Q out to a trajectory; it is :func:`run` that lets it learn.
     method
         The weight update.
@@ -123,10 +122,10 @@ def iterate(
     ITERATION-COUNT: an iteration is one weight update, the counter i of the listings.
     """
     learning, rolling = stream(child(seed, 0)), stream(child(seed, 1))
-    memory = method.start(task.shape, params.update)
+    memory = method.start(agent.shape, params.update)
     seen = mu_b if method.uses_incorrect else np.zeros_like(mu_b)
-    w = _start_weights(task.shape, params, seed=child(seed, 2))
-    q = np.zeros(task.shape)
+    w = _start_weights(agent.shape, params, seed=child(seed, 2))
+    q = np.zeros(agent.shape)
     errors: list[float] = []
     episodes: list[Episode] = []
     values: list[NDArray[np.float32]] = []
@@ -134,11 +133,11 @@ def iterate(
     on_path = np.flatnonzero(mu_e.any(axis=1))
     steps = 0
     for i in range(params.loop.max_iterations + 1):
-        episode, rolling = task.roll_out(q, rolling)
+        episode, rolling = agent.roll_out(q, rolling)
         mu_i = feature_expectations(
-            episode.states, episode.actions, gamma=params.learner.gamma, shape=task.shape
+            episode.states, episode.actions, gamma=params.learner.gamma, shape=agent.shape
         )  # Eq. 7
-        errors.append(float(np.linalg.norm(mu_e - mu_i)))  # Eq. 6
+        errors.append(norm(mu_e - mu_i))  # Eq. 6
         episodes.append(episode)
         values.append(q[on_path].max(axis=1).astype(np.float32))
         if keep:
@@ -148,8 +147,8 @@ def iterate(
             break
         w, memory = method.update(w, memory, mu_e, mu_i, seen, params.update)
         if params.loop.w_norm == "unit":
-            w = w / np.linalg.norm(w)
-        begin = np.zeros(task.shape) if params.learner.q_start == "reset" else q
+            w = w / norm(w)
+        begin = np.zeros(agent.shape) if params.learner.q_start == "reset" else q
         q, learning, n = yield Request(w, begin, learning)
         steps += n
     snapshots = None
@@ -161,11 +160,11 @@ def iterate(
 
 
 def run(
-    task: Task, trials: Iterable[Generator[Request, Answer, Trial]]
+    agent: Agent, trials: Iterable[Generator[Request, Answer, Trial]]
 ) -> Iterator[tuple[int, Trial]]:
     """Run trials side by side, yielding each one's position and outcome as it finishes.
 
-    The trials learn in one call of `task.learn` an iteration; what comes out of a trial does not
+    The trials learn in one call of `agent.learn` an iteration; what comes out of a trial does not
     depend on the others.
     """
     live = dict(enumerate(trials))
@@ -180,7 +179,7 @@ def run(
                 yield position, stop.value
         if requests:
             batch = (np.stack(part) for part in zip(*requests.values(), strict=True))
-            learned = zip(requests, *task.learn(*batch), strict=True)
+            learned = zip(requests, *agent.learn(*batch), strict=True)
             answers = {position: Answer(q, s, int(n)) for position, q, s, n in learned}
 
 

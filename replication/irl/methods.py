@@ -8,23 +8,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.choices import unknown_name
+from replication.errors import unknown
 from replication.irl import adaboost, unified
-from replication.params import Update
+from replication.paper.params import Update
+from replication.paper.register import ChoiceError
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Method:
-    """An IRL method: all that tells it from the others.
+    """An IRL method, and all that the rest of the package has to know of it.
 
     Attributes
     ----------
-    name, label
-        For parameters and data; for tables and figures.
+    name, label, colour
+        For parameters and data; for tables and figures; for figures.
+    readings
+        The readings of Eq. 9 (choice F-INDEX) under which it is run; one empty text if it has no
+        trace.
     uses_incorrect
         Whether mu_B is given to the update; otherwise it sees no incorrect pair.
+    baseline
+        The method that it is compared with, if any.
     start
         Returns what the update remembers before the first iteration, `[state, action]`.
     update
@@ -33,7 +39,10 @@ class Method:
 
     name: str
     label: str
+    colour: str
+    readings: tuple[str, ...]
     uses_incorrect: bool
+    baseline: str
     start: Callable[[tuple[int, int], Update], Array]
     update: Callable[
         [Array, Array, Array, Array, NDArray[np.bool_], Update],
@@ -41,14 +50,45 @@ class Method:
     ]
 
 
+READINGS = ("printed", "updated")
+"""Both readings of Eq. 9 (choice F-INDEX), reported side by side everywhere."""
+
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        Method("adaboost", "AdaBoost-IRL (R1)", False, adaboost.start, adaboost.update),
-        Method("unified", "Unified, without incorrect", False, unified.start, unified.update),
-        Method("unified-incorrect", "Unified, with incorrect", True, unified.start, unified.update),
+        Method(
+            name="adaboost",
+            label="AdaBoost-IRL (R1)",
+            colour="#7A7A7A",
+            readings=("",),
+            uses_incorrect=False,
+            baseline="",
+            start=adaboost.start,
+            update=adaboost.update,
+        ),
+        Method(
+            name="unified",
+            label="Unified, without incorrect",
+            colour="#0072B2",
+            readings=READINGS,
+            uses_incorrect=False,
+            baseline="adaboost",
+            start=unified.start,
+            update=unified.update,
+        ),
+        Method(
+            name="unified-incorrect",
+            label="Unified, with incorrect",
+            colour="#D55E00",
+            readings=READINGS,
+            uses_incorrect=True,
+            baseline="unified",
+            start=unified.start,
+            update=unified.update,
+        ),
     )
 }
+"""In the order in which tables and figures show them. A new method is one more row."""
 
 
 def get_method(name: str) -> Method:
@@ -65,5 +105,5 @@ def get_method(name: str) -> Method:
     'Unified, without incorrect'
     """
     if name not in METHODS:
-        raise unknown_name(name, list(METHODS), "method")
+        raise ChoiceError(unknown(name, METHODS, "method"))
     return METHODS[name]

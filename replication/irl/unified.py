@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.params import Update
+from replication.paper.params import Update
 
 Array = NDArray[np.float64]
 

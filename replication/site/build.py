@@ -11,15 +11,16 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from replication import paths, provenance
+from replication import files
+from replication.evidence.tables import read_table
 from replication.files import write_file
-from replication.folders import exclusive, executed_folder, outputs_folder
-from replication.freshness import FRESH, PROSE, read_runs, state_of
-from replication.regenerate import refresh_text
-from replication.runs import Run, prepare
+from replication.pipeline import provenance
+from replication.pipeline.folders import exclusive, executed_folder, outputs_folder
+from replication.pipeline.freshness import FRESH, PROSE, read_runs, state_of
+from replication.pipeline.plan import Run, prepare
+from replication.pipeline.run import refresh_text
 from replication.site import overview
 from replication.site.pages import Provenance, anchor, page
-from replication.tables import read_table
 
 PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
 """Files of the project that pages link to."""
@@ -64,7 +65,7 @@ def build_site(
         raise SiteError(f"{site} holds other files than a site; choose another folder")
     out = outputs_folder("paper")
     folder = executed_folder(out, "paper")
-    work = paths.PROJECT / "build" / "site-work"
+    work = files.PROJECT / "build" / "site-work"
     with exclusive((out, work), echo):
         runs = prepare(notebooks, profile="paper")
         _check(runs, out, folder)
@@ -105,12 +106,12 @@ def _stage(staged: Mapping[str, bytes], work: Path) -> None:
 
 
 def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str, bytes]]:
-    docs = paths.PROJECT / "docs"
+    docs = files.PROJECT / "docs"
     for path in sorted(docs.rglob("*.md")):
         yield path.relative_to(docs).as_posix(), path.read_bytes()
     for pattern in PLACES:
-        for path in sorted(paths.PROJECT.glob(pattern)):
-            yield path.relative_to(paths.PROJECT).as_posix(), path.read_bytes()
+        for path in sorted(files.PROJECT.glob(pattern)):
+            yield path.relative_to(files.PROJECT).as_posix(), path.read_bytes()
     yield "_generated/readme.md", _readme().encode()
     for path in sorted(out.glob("[!.]*")):
         if path.suffix != ".ipynb":
@@ -134,7 +135,7 @@ def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str
 
 def _readme() -> str:
     """Return the README; tables and executed notebooks in files that it links to are pages here."""
-    text = (paths.PROJECT / "README.md").read_text(encoding="utf-8")
+    text = (files.PROJECT / "README.md").read_text(encoding="utf-8")
     text = re.sub(r"(?<=\()figures/(\w+\.ipynb)(?=\))", r"notebooks/\1", text)
     return re.sub(r"(?<=\()figures/(\w+)\.md(?=\))", lambda match: f"#{anchor(match[1])}", text)
 
@@ -145,14 +146,14 @@ def _overview(out: Path) -> dict[str, str]:
         "verdicts": overview.verdicts(judged),
         "published": overview.published(judged),
         "choices": overview.choices(read_table(out / "sensitivity_shares.csv")),
-        "citation": overview.citation((paths.PROJECT / "CITATION.cff").read_text("utf-8")),
+        "citation": overview.citation((files.PROJECT / "CITATION.cff").read_text("utf-8")),
     }
 
 
 def _write(work: Path) -> None:
     """Let Sphinx write the pages that changed; a warning is an error."""
     command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-N", "-W", "--keep-going"]
-    command += ["-c", str(paths.PROJECT / "docs"), "-d", str(work / "doctrees")]
+    command += ["-c", str(files.PROJECT / "docs"), "-d", str(work / "doctrees")]
     outline, known = _outline(work / "source"), work / "outline"
     if not known.exists() or known.read_text(encoding="utf-8") != outline:
         command.append("-a")  # the sidebar of every page shows it

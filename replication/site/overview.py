@@ -14,10 +14,10 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from replication.choices import Choice, register
-from replication.comparisons import F_INDICES
+from replication.evidence.tables import markdown, readable_verdicts
+from replication.irl import READINGS
+from replication.paper.register import Choice, load_choices
 from replication.site.pages import anchor
-from replication.tables import markdown, readable_verdicts
 
 EVIDENCE = {
     ("open-maze", "iterations"): "table1_contrasts",
@@ -120,7 +120,7 @@ def interval_plot(part: pd.DataFrame) -> str:
 
 def _reading(f_index: str) -> str:
     """Return the reading of Eq. 9; a claim about a method without a trace has but one line."""
-    return f_index or F_INDICES[0]
+    return f_index or READINGS[0]
 
 
 def _in_words(part: pd.DataFrame) -> str:
@@ -141,7 +141,7 @@ def choices(shares: pd.DataFrame) -> str:
     shares
         By claim and choice, the share of the variance of the claim's effect over specifications.
     """
-    entries = list(register().values())
+    entries = list(load_choices().values())
     table = pd.DataFrame(
         {
             "Choice": [f"[{one.id}](#choice-{one.id.lower()})" for one in entries],

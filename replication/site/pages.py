@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from replication.choices import register
+from replication.paper.register import load_choices
 
 PICTURE = re.compile(r"!\[(?P<alt>.*)\]\((?P<file>[\w.-]+)\)", re.DOTALL)
 PLAYER = re.compile(r"\[[\w.-]+\]\((?P<file>[\w.-]+\.html)\)")
@@ -127,7 +127,7 @@ def link_choices(text: str) -> str:
     >>> link_choices("two readings (choice F-INDEX), `F-INDEX`")
     'two readings (choice [F-INDEX](#choice-f-index)), `F-INDEX`'
     """
-    ids = "|".join(sorted(map(re.escape, register()), key=len, reverse=True))
+    ids = "|".join(sorted(map(re.escape, load_choices()), key=len, reverse=True))
     return re.sub(
         rf"(?<![\w`\[-])({ids})(?![\w`\]-])",
         lambda match: f"[{match[1]}](#choice-{match[1].lower()})",

@@ -1,0 +1,1 @@
+"""What the expert shows: demonstrations, their files, and the scripted experts."""

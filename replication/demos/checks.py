@@ -1,0 +1,116 @@
+"""What a demonstration has to be; an error is one line that says where it is wrong and how to fix it.
+
+A demonstration is checked by replaying its actions from the start. Cells count from 0.
+Steps count from 1: step k takes ``actions[k - 1]`` and leads to ``states[k]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication.envs.environment import Environment
+from replication.errors import UserError, compact, show, suggest
+
+
+class DemoError(UserError):
+    """Demonstrations that cannot be used; the message is one line, with the place and the fix."""
+
+
+class DemoWarning(UserWarning):
+    """Demonstrations that can be used, but which no deterministic policy can match exactly."""
+
+
+def action_numbers(
+    environment: Environment, name: str, actions: Sequence[str]
+) -> NDArray[np.int64]:
+    """Return the numbers of named actions, int64 [T].
+
+    Raises
+    ------
+    DemoError
+        If the environment does not know an action of the demonstration `name`.
+    """
+    numbers = {action: number for number, action in enumerate(environment.actions)}
+    for step, action in enumerate(actions, start=1):
+        if action not in numbers:
+            raise DemoError(
+                f"step {step} of demo {show(name)}: unknown action {show(action)}; "
+                f"{suggest(action, environment.actions)}use {', '.join(environment.actions)}"
+            )
+    return np.array([numbers[action] for action in actions], dtype=np.int64)
+
+
+def replay(
+    environment: Environment, name: str, actions: NDArray[np.int64], claims: list[list[int]] | None
+) -> NDArray[np.int64]:
+    """Return the states [T + 1] that actions [T] visit from the start on.
+
+    Raises
+    ------
+    DemoError
+        If the recorded states (`claims`) differ from the replayed ones.
+    """
+    states = environment.replay(actions)
+    cells = environment.cells(states).tolist()
+    claims = cells if claims is None else claims
+    for step, (due, claim) in enumerate(zip(cells, claims, strict=False)):
+        if claim == due:
+            continue
+        right, claimed = compact(due), compact(claim)
+        if step == 0:
+            raise DemoError(
+                f"demo {show(name)} begins at {claimed}, but the start is {right}; write {right}"
+            )
+        action, before = environment.actions[actions[step - 1]], cells[step - 1]
+        outcome = no_op_phrase(environment) if due == before else f"leads to {right}"
+        raise DemoError(
+            f"step {step} of demo {show(name)}: {action!r} from {compact(before)} {outcome}, but "
+            f"the file claims {claimed}; write {right} or change the action"
+        )
+    if len(cells) != len(claims):
+        raise DemoError(
+            f"demo {show(name)} has {len(actions)} actions and {len(claims)} states; give "
+            f"{len(cells)} states, the last one reached included, or leave 'states' out"
+        )
+    return states
+
+
+def check_moves(
+    environment: Environment, name: str, actions: NDArray[np.int64], states: NDArray[np.int64]
+) -> None:
+    """Refuse a demonstration that is empty, leaves the moves, or goes on beyond the goal.
+
+    Raises
+    ------
+    DemoError
+        On the first thing that is wrong.
+    """
+    if not actions.size:
+        raise DemoError(f"demo {show(name)} is empty; give it at least one action")
+    if actions.min() < 0 or actions.max() >= environment.n_actions:
+        raise DemoError(f"demo {show(name)}: actions must be 0..{environment.n_actions - 1}")
+    replay(environment, name, actions, environment.cells(states).tolist())
+    end = environment.goal_step(actions)
+    if end is not None and end < actions.size:
+        raise DemoError(
+            f"demo {show(name)} goes on after reaching the goal at step {end}; "
+            f"drop the {actions.size - end} steps that follow"
+        )
+
+
+def goal_phrase(environment: Environment) -> str:
+    """Return the goal of an environment in words."""
+    if environment.kind == "soccer":
+        return "the gate, as no goal falls"
+    goal = getattr(environment, "goal", None)
+    return "the goal" if goal is None else f"the goal {compact(environment.cell(goal))}"
+
+
+def no_op_phrase(environment: Environment) -> str:
+    """Return in words what it means that a move leaves the state as it was."""
+    return {"maze": "hits a wall and stays", "soccer": "stays in its cell"}.get(
+        environment.kind, "changes nothing"
+    )

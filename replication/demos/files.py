@@ -1,0 +1,155 @@
+"""Read and write demonstration files; :mod:`replication.demos.schema` describes their format."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from replication.demos.checks import DemoError, DemoWarning, action_numbers, replay
+from replication.demos.model import Demo, Demos, state_action_pairs
+from replication.demos.schema import FORMAT, VERSION, CorrectFields, IncorrectFields, read_fields
+from replication.demos.strict_json import layout, read_content, reason
+from replication.envs.environment import Environment
+from replication.errors import compact, show
+from replication.files import write_file
+
+
+def load_demos(path: str | os.PathLike[str]) -> Demos:
+    """Read and check a demonstration file.
+
+    Raises
+    ------
+    DemoError
+        On the first thing that is wrong, in one line that names the file, the place and the fix.
+
+    Warns
+    -----
+    DemoWarning
+        If no deterministic policy can match the correct demos exactly, or if an incorrect demo
+        has no effect.
+    """
+    demos = _read(path)
+    for warning in _warnings(demos):
+        warnings.warn(f"{_file(path)}: {warning}", DemoWarning, stacklevel=2)
+    return demos
+
+
+def check_demos(path: str | os.PathLike[str]) -> list[str]:
+    """Check a demonstration file; returns its warnings, raises `DemoError` like `load_demos`."""
+    return [f"{_file(path)}: {warning}" for warning in _warnings(_read(path))]
+
+
+def parse_demos(content: bytes) -> Demos:
+    """Read and check the content of a demonstration file.
+
+    Raises
+    ------
+    DemoError
+        On the first thing that is wrong, in one line that names the place and the fix.
+    """
+    fields = read_fields(content)
+    environment = fields.environment.build()
+    return Demos(
+        task=fields.task,
+        environment=environment,
+        correct=tuple(_demo(environment, "correct", demo) for demo in fields.correct),
+        incorrect=tuple(_demo(environment, demo.kind, demo) for demo in fields.incorrect),
+        description=fields.description,
+    )
+
+
+def demos_document(demos: Demos) -> dict[str, Any]:
+    """Return what a demonstration file holds, as plain JSON values."""
+
+    def trajectory(demo: Demo) -> dict[str, Any]:
+        return {
+            "actions": [demos.environment.actions[action] for action in demo.actions],
+            "states": demos.environment.cells(demo.states).tolist(),
+        }
+
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "task": demos.task,
+        "description": demos.description,
+        "environment": demos.environment.describe(),
+        "correct": [{"name": demo.name} | trajectory(demo) for demo in demos.correct],
+        "incorrect": [
+            {"name": demo.name, "kind": demo.kind} | trajectory(demo) for demo in demos.incorrect
+        ],
+    }
+
+
+def save_demos(demos: Demos, path: str | os.PathLike[str]) -> None:
+    """Write a demonstration file in the one stable layout; an old file is replaced at once.
+
+    Raises
+    ------
+    DemoError
+        If the file could not be read back (its text is too long, for instance) or not be written.
+    """
+    with _naming(path):
+        try:
+            content = (layout(demos_document(demos)) + "\n").encode()
+            parse_demos(content)
+            write_file(path, content)
+        except DemoError:
+            raise
+        except (OSError, ValueError) as error:
+            raise DemoError(f"cannot be written ({reason(error)})") from None
+
+
+def _demo(environment: Environment, kind: str, fields: CorrectFields | IncorrectFields) -> Demo:
+    actions = action_numbers(environment, fields.name, fields.actions)
+    states = replay(environment, fields.name, actions, fields.states)
+    return Demo(fields.name, kind, states, actions)
+
+
+def _warnings(demos: Demos) -> list[str]:
+    """Return what cannot be learned from demonstrations that are otherwise usable."""
+    found = []
+    conflicts = demos.conflicts()
+    if conflicts:
+        state = conflicts[0]
+        asked = sorted({a for d in demos.correct for a in d.actions[d.states[:-1] == state]})
+        actions = " and ".join(repr(demos.environment.actions[action]) for action in asked)
+        found.append(
+            f"the correct demos ask for {actions} in {compact(demos.environment.cell(state))}"
+            f" (one of {len(conflicts)} such states): d = 0 cannot be reached"
+        )
+    paths = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
+    if len(paths) > 1:
+        found.append(
+            f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
+            "which a single deterministic trajectory cannot match"
+        )
+    right = state_action_pairs(*demos.correct)
+    found += [
+        f"incorrect demo {show(demo.name)} has no effect: each of its pairs of a state and an "
+        "action is a correct demo's, too"
+        for demo in demos.incorrect
+        if state_action_pairs(demo) <= right
+    ]
+    return found
+
+
+def _read(path: str | os.PathLike[str]) -> Demos:
+    with _naming(path):
+        return parse_demos(read_content(path))
+
+
+@contextmanager
+def _naming(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the file's name before what is refused."""
+    try:
+        yield
+    except DemoError as error:
+        raise DemoError(f"{_file(path)}: {error}") from None
+
+
+def _file(path: str | os.PathLike[str]) -> str:
+    text = os.fsdecode(path)
+    return text if text.isprintable() else repr(text)

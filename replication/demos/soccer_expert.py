@@ -1,0 +1,148 @@
+"""The scripted expert in robot soccer: the rules that made the stored demonstrations.
+
+``correct``
+    Drives to the ball, more slowly while an obstacle is detected, and kicks it into the gate: a
+    function of the discretised state, else d = 0 could not be reached.
+
+The expert shows the paper's four kinds of mistakes. It leaves the correct path at its start and
+wherever its action changes, or else at every decision (choice SOCCER-INCORRECT), and there
+
+``hit``
+    drives on to the right, or to the left, until it touches an obstacle or a wall;
+``detour``
+    goes to the right, or to the left, for four decisions, or fewer if it would touch something,
+    and from there to the ball as ever (the number is that of DETOUR-WIDTH);
+``overspeed``
+    does not slow down any more, up to a contact or the goal;
+``opposite``
+    drives away from the ball, for as many decisions as it has driven, but at least four.
+
+Equal demonstrations are kept once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from replication.demos.model import Demo, Demos
+from replication.envs.soccer.compiled import FastSoccerWorld
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import BACKWARD, FORWARD, LEFT, RIGHT, expert_action
+from replication.paper.register import Chosen, choice, load_choices
+
+
+@dataclass(frozen=True)
+class SoccerExpert(Chosen):
+    """Where the scripted soccer expert leaves the correct path to show a mistake."""
+
+    leave: str = choice("SOCCER-INCORRECT")
+
+
+LONGEST = 100
+"""Decisions after which the expert gives a drive up."""
+
+
+def demonstrate_soccer(
+    task: str,
+    field: SoccerField | None = None,
+    *,
+    params: SoccerExpert | None = None,
+    description: str = "",
+) -> Demos:
+    """Return the demonstrations of all kinds on a field."""
+    field = field or SoccerField()
+    correct = _drive(field, [], lambda world, state: expert_action(state))
+    assert correct is not None, "the expert does not score on this field"
+    return Demos(
+        task=task,
+        environment=field,
+        correct=(_demo(field, correct, "correct", "correct"),),
+        incorrect=tuple(incorrect_demos(field, correct, params=params or SoccerExpert())),
+        description=description,
+    )
+
+
+def incorrect_demos(
+    field: SoccerField, correct: list[int], *, params: SoccerExpert
+) -> Iterator[Demo]:
+    """Yield the incorrect demonstrations of every kind that belong to a correct one."""
+    leave = [t for t in range(len(correct)) if t == 0 or correct[t] != correct[t - 1]]
+    if params.leave == "every":
+        leave = list(range(len(correct)))
+    sides = (RIGHT, LEFT)
+    drives: dict[str, list[list[int] | None]] = {
+        "hit": [_hit(field, correct[:t], side) for t in leave for side in sides],
+        "detour": [_detour(field, correct, t, side) for t in leave for side in sides],
+        "overspeed": [_overspeed(field, correct[:t]) for t in leave],
+        "opposite": [_opposite(field, correct[:t]) for t in leave],
+    }
+    seen = {tuple(correct)}
+    for kind, found in drives.items():
+        number = 0
+        for actions in found:
+            if actions is not None and tuple(actions) not in seen:
+                seen.add(tuple(actions))
+                number += 1
+                yield _demo(field, actions, f"{kind}-{number}", kind)
+
+
+def _width() -> int:
+    return int(load_choices()["DETOUR-WIDTH"].default)
+
+
+def _hit(field: SoccerField, begin: list[int], side: int) -> list[int] | None:
+    return _drive(field, begin, lambda world, state: side, end_at_contact=True)
+
+
+def _overspeed(field: SoccerField, begin: list[int]) -> list[int] | None:
+    return _drive(field, begin, lambda world, state: FORWARD, end_at_contact=True)
+
+
+def _opposite(field: SoccerField, begin: list[int]) -> list[int]:
+    actions = [*begin, *[BACKWARD] * max(len(begin), _width())]
+    return actions[: field.goal_step(actions)]  # the ball may be rolling by then
+
+
+def _detour(field: SoccerField, correct: list[int], at: int, side: int) -> list[int] | None:
+    for width in range(_width(), 0, -1):
+        begin = [*correct[:at], *[side] * width]
+        actions = _drive(field, begin, lambda world, state: expert_action(state))
+        if actions is not None and len(actions) > len(correct) and not _touches(field, actions):
+            return actions
+    return None
+
+
+def _drive(
+    field: SoccerField,
+    begin: list[int],
+    policy: Callable[[FastSoccerWorld, int], int],
+    *,
+    end_at_contact: bool = False,
+) -> list[int] | None:
+    """Take actions and go on with a policy to the goal, or to a contact; None if neither."""
+    world = FastSoccerWorld(field.params)
+    state, actions = world.reset(), list[int]()
+    while len(actions) < LONGEST:
+        action = begin[len(actions)] if len(actions) < len(begin) else policy(world, state)
+        state, scored, timed_out = world.step(action)
+        actions.append(action)
+        if scored or (end_at_contact and any(world.contacts) and len(actions) > len(begin)):
+            return actions
+        if timed_out:
+            return None
+    return None
+
+
+def _touches(field: SoccerField, actions: list[int]) -> bool:
+    world = FastSoccerWorld(field.params)
+    world.reset()
+    for action in actions:
+        world.step(action)
+    return any(world.contacts)
+
+
+def _demo(field: SoccerField, actions: list[int], name: str, kind: str) -> Demo:
+    return Demo(name=name, kind=kind, states=field.replay(actions), actions=np.array(actions))

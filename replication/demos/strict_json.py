@@ -1,0 +1,125 @@
+"""The JSON of demonstration files: read strictly, written in one stable layout."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import stat
+from collections import Counter
+from pathlib import Path
+from typing import Any, NoReturn
+
+from replication.demos.checks import DemoError
+from replication.errors import clip, compact, show
+
+MAX_BYTES = 10_000_000
+MAX_FIELDS = 50
+
+
+def read_content(path: str | os.PathLike[str]) -> bytes:
+    """Return the bytes of a regular file that is not too large.
+
+    Raises
+    ------
+    DemoError
+        If there is none.
+    """
+    try:
+        info = Path(path).stat()
+        if not stat.S_ISREG(info.st_mode):
+            raise DemoError("is not a regular file; give the path of a JSON file")
+        _check_size(info.st_size)
+        with Path(path).open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except DemoError:
+        raise
+    except (OSError, ValueError) as error:
+        raise DemoError(f"cannot be read ({reason(error)})") from None
+
+
+def read_json(content: bytes) -> Any:
+    """Read JSON text, without what JSON or its readers leave open.
+
+    Raises
+    ------
+    DemoError
+        If it is not UTF-8, not JSON, too large or too deep, or holds a field twice or a number
+        that is not finite.
+    """
+    _check_size(len(content))
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DemoError(f"is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from None
+    if not text.strip():
+        raise DemoError("is empty; a demonstration file is one JSON object")
+    try:
+        return json.loads(
+            text,
+            object_pairs_hook=_object,
+            parse_int=_integer,
+            parse_float=_float,
+            parse_constant=_constant,
+        )
+    except json.JSONDecodeError as error:
+        raise DemoError(
+            f"is not JSON: {error.msg} at line {error.lineno}, column {error.colno}; fix it there"
+        ) from None
+    except RecursionError:
+        raise DemoError("is nested too deeply; a demonstration file needs five levels") from None
+
+
+def layout(value: Any, *, rows: bool = False, indent: str = "\n") -> str:
+    """JSON text: an object's fields and a map's rows have lines of their own, other lists one."""
+    inner = indent + "  "
+    if isinstance(value, dict):
+        items = [
+            f"{compact(key)}: {layout(item, rows=key == 'map', indent=inner)}"
+            for key, item in value.items()
+        ]
+        return "{" + inner + f",{inner}".join(items) + indent + "}"
+    if isinstance(value, list) and value and (rows or isinstance(value[0], dict)):
+        items = [layout(item, indent=inner) for item in value]
+        return "[" + inner + f",{inner}".join(items) + indent + "]"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(compact, value)) + "]"
+    return compact(value)
+
+
+def reason(error: Exception) -> str:
+    """Say why a file cannot be read or written."""
+    text = getattr(error, "strerror", None) or str(error)
+    return text[:1].lower() + text[1:]
+
+
+def _check_size(n_bytes: int) -> None:
+    if n_bytes > MAX_BYTES:
+        raise DemoError(f"is larger than {MAX_BYTES // 1_000_000} MB; drop some demos")
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
+        raise DemoError(f"the field {show(twice)} stands twice in one object; keep one")
+    if len(fields) > MAX_FIELDS:
+        raise DemoError(f"an object has {len(fields)} fields; no object of this format has so many")
+    return fields
+
+
+def _integer(text: str) -> int:
+    if len(text) > 16:
+        raise DemoError(f"the number {clip(text)} is too large; write a small integer")
+    return int(text)
+
+
+def _float(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise DemoError(f"the number {clip(text)} is too large; write a small number")
+    return value
+
+
+def _constant(text: str) -> NoReturn:
+    raise DemoError(f"{text} is not a JSON number; write a finite number")

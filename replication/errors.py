@@ -1,0 +1,60 @@
+"""What a user is told when something is wrong: one line that says where and how to fix it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+
+class UserError(ValueError):
+    """A mistake in what the package was given; the message is one line for the user."""
+
+
+def unknown(name: str, known: Iterable[str], what: str) -> str:
+    """Return the message about a misspelt `name`, with the nearest of the `known` ones first.
+
+    Examples
+    --------
+    >>> unknown("alpa", ["alpha", "beta"], "parameter")
+    "unknown parameter 'alpa' (did you mean 'alpha'?); known: alpha, beta"
+    """
+    names = list(known)
+    near = difflib.get_close_matches(name[:40], names, n=1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    return f"unknown {what} {name!r}{hint}; known: {', '.join(names)}"
+
+
+def compact(value: Any) -> str:
+    """JSON text without blanks."""
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+
+
+def suggest(word: str, known: Sequence[str]) -> str:
+    """Ask whether a similar word was meant, if there is one."""
+    close = difflib.get_close_matches(word[:40], known, n=1)
+    return f"did you mean {close[0]!r}? " if close else ""
+
+
+def show(value: Any) -> str:
+    r"""Name any JSON value in a few words.
+
+    Examples
+    --------
+    >>> show([1, 2]), show([0] * 9), show("two\nlines"), show(None)
+    ('[1, 2]', 'a list of 9', "'two\\nlines'", 'null')
+    """
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list):
+        short = len(value) <= 4 and all(isinstance(item, int | str) for item in value)
+        return clip(repr(value)) if short else f"a list of {len(value)}"
+    if isinstance(value, str):
+        return clip(repr(value[:200]))
+    return clip(json.dumps(value))
+
+
+def clip(text: str, length: int = 60) -> str:
+    """Cut a long text."""
+    return text if len(text) <= length else f"{text[: length - 3]}..."

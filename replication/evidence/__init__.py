@@ -1,0 +1,1 @@
+"""From trials to tables, verdicts and what they depend on."""

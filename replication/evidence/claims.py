@@ -1,0 +1,247 @@
+"""The paper's claims and the frozen criteria by which they are judged: the file ``claims.toml``.
+
+This module only reads and checks; :mod:`replication.evidence.verdicts` judges.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from replication.errors import UserError, unknown
+from replication.evidence.statistics import CONFIDENCE
+from replication.irl import METHODS
+from replication.paper.published import Published
+
+TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
+Reading = Literal["printed", "updated"]
+Measure = Literal["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
+Statistic = Literal[
+    "mean-difference",
+    "sd-ratio",
+    "mean",
+    "share",
+    "published-mean",
+    "published-sd",
+    "published-run",
+]
+
+TESTS = {"mean-difference": "signed-rank", "mean": "signed-rank", "sd-ratio": "brown-forsythe"}
+"""The test that stands beside a statistic's interval; the others have none."""
+
+LABELS = {
+    "FASTER": "faster than AdaBoost-IRL",
+    "STEADIER": "steadier than AdaBoost-IRL",
+    "SAVES-OPEN": "saves iterations, open maze",
+    "SAVES-OBSTACLES": "saves iterations, obstacles",
+    "SAVES-SOCCER": "saves iterations, soccer",
+    "ZERO-OPEN": "error falls to zero, open maze",
+    "ZERO-OBSTACLES": "error falls to zero, obstacles",
+    "ZERO-SOCCER": "error falls to zero, soccer",
+    "AVOIDS-OPEN": "errs less at first, open maze",
+    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
+    "AVOIDS-SOCCER": "errs less at first, soccer",
+    "Q-GROWS": "Q grows along the path",
+    "Q-TO-GOAL": "Q grows toward the goal",
+    "REWARD-TO-GOAL": "reward grows toward the goal",
+}
+"""What each comparative claim says, in a few words, and on which task."""
+
+
+def short_label(id: str) -> str:
+    """Return what a claim says without its task, for where the task changes.
+
+    Examples
+    --------
+    >>> short_label("SAVES-OPEN")
+    'saves iterations'
+    """
+    return LABELS.get(id, id.lower()).partition(",")[0]
+
+
+class ClaimError(UserError):
+    """A file of claims that cannot be used; the message is one line."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Claim(_Strict):
+    """One claim of the paper; ``claims.toml`` explains the fields.
+
+    `paper` has mean, SD and number of trials by method; `used` says why no verdict is given, by
+    the reading of Eq. 9 or for all of them.
+    """
+
+    id: str
+    claim: str
+    place: str
+    task: TaskName
+    measure: Measure
+    statistic: Statistic
+    x: str
+    y: str = ""
+    direction: Literal["less", "greater", "inside"] = "inside"
+    margin: float = 0.0
+    test: Literal["signed-rank", "brown-forsythe", "none"] = "none"
+    note: str = ""
+    paper: Mapping[str, tuple[float, float, int]] = {}
+    used: Mapping[Literal["printed", "updated", "all"], str] = {}
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        published = self.statistic.startswith("published")
+        for method in (self.x, *filter(None, [self.y]), *self.paper):
+            if method not in METHODS:
+                raise ValueError(f"there is no method {method!r}; known: {', '.join(METHODS)}")
+        if self.test != TESTS.get(self.statistic, "none"):
+            wanted = TESTS.get(self.statistic, "none")
+            raise ValueError(f"the test of {self.statistic!r} is {wanted!r}, not {self.test!r}")
+        if (self.direction == "inside") != published:
+            raise ValueError(f"{self.direction!r} does not go with {self.statistic!r}")
+        if published and self.x not in self.paper:
+            raise ValueError(f"paper.{self.x} is missing")
+        if self.statistic in ("mean-difference", "sd-ratio") and not self.y:
+            raise ValueError(f"{self.statistic!r} needs y")
+        if self.x == self.y:
+            raise ValueError(f"x and y are both {self.x!r}; name two methods")
+        if self.paper and self.y and not {self.x, self.y} <= set(self.paper):
+            raise ValueError(f"paper has to have both {self.x!r} and {self.y!r}, or neither")
+        return self
+
+    def published(self, method: str) -> Published:
+        """Return the published numbers of a method."""
+        return Published(self.place, *self.paper[method])
+
+    @property
+    def paper_effect(self) -> float:
+        """The published effect in the claim's own statistic, NaN where none is published."""
+        if not self.paper:
+            return math.nan
+        (mean, sd, _), *_ = (self.paper[self.x],)
+        if self.statistic == "mean-difference":
+            return mean - self.paper[self.y][0]
+        if self.statistic == "sd-ratio":
+            return sd / self.paper[self.y][1]
+        return sd if self.statistic == "published-sd" else mean
+
+
+class Judging(_Strict):
+    """What holds for all claims: the judging run, and the criterion's numbers."""
+
+    root_seed: Annotated[int, Field(ge=0)]
+    fewest: Annotated[int, Field(ge=2)]
+    confidence: float
+    level: Annotated[float, Field(gt=0, lt=1)]
+    readings: tuple[Reading, ...]
+    trials: Mapping[TaskName, Annotated[int, Field(ge=2)]]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.confidence != CONFIDENCE:
+            raise ValueError(
+                f"all intervals have a confidence of {CONFIDENCE}, not {self.confidence}; "
+                "change it in replication/statistics.py, too"
+            )
+        return self
+
+
+class Explored(_Strict):
+    """Runs whose outcome was known when the criteria were frozen."""
+
+    root_seeds: tuple[int, ...]
+    what: str
+
+
+class Claims(_Strict):
+    """The whole file: the judging run, the claims, and what was run before."""
+
+    judging: Judging
+    explored: tuple[Explored, ...]
+    claim: tuple[Claim, ...]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        ids = [one.id for one in self.claim]
+        for one in self.claim:
+            if ids.count(one.id) > 1:
+                raise ValueError(f"the claim {one.id!r} is there twice")
+            if one.task not in self.judging.trials:
+                raise ValueError(f"judging.trials has no {one.task!r}")
+        if any(self.judging.root_seed in run.root_seeds for run in self.explored):
+            seed = self.judging.root_seed
+            raise ValueError(f"root seed {seed} was explored; judge by one that never was")
+        return self
+
+    def by_id(self, id: str) -> Claim:
+        """Return one claim.
+
+        Raises
+        ------
+        ClaimError
+            If there is none with that id.
+        """
+        known = {one.id: one for one in self.claim}
+        if id not in known:
+            raise ClaimError(unknown(id, known, "claim"))
+        return known[id]
+
+
+@cache
+def load_claims() -> Claims:
+    """Return the claims of the package."""
+    return parse_claims(_text())
+
+
+def parse_claims(text: str) -> Claims:
+    """Read and check a file of claims.
+
+    Raises
+    ------
+    ClaimError
+        In one line that names the claim and the key, for whatever is unknown, missing or does not
+        fit the rest.
+    """
+    try:
+        document = tomllib.loads(text)
+        return Claims(**document)
+    except tomllib.TOMLDecodeError as error:
+        raise ClaimError(f"claims.toml is not TOML: {error}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = list(first["loc"])
+        if place[:1] == ["claim"] and len(place) > 1:
+            entry = document["claim"][place[1]]
+            name = entry.get("id", place[1]) if isinstance(entry, dict) else place[1]
+            place[:2] = [f"claim {name}"]
+        where = ", ".join(["claims.toml", ".".join(map(str, place))] if place else ["claims.toml"])
+        said = first["msg"].removeprefix("Value error, ")
+        if first["type"] not in ("value_error", "missing"):
+            said += f", not {first['input']!r:.80}"
+        raise ClaimError(f"{where}: {said}") from None
+
+
+def criteria_hash() -> str:
+    """Return the hash of the frozen file, which stands beside every verdict."""
+    return canonical_hash(_text())
+
+
+def canonical_hash(text: str) -> str:
+    """Return the SHA-256 of what a TOML text says, whatever its layout, order and comments are."""
+    document = json.dumps(tomllib.loads(text), sort_keys=True, separators=(",", ":"), default=str)
+    return hashlib.sha256(document.encode()).hexdigest()
+
+
+def _text() -> str:
+    return (
+        resources.files("replication.evidence").joinpath("claims.toml").read_text(encoding="utf-8")
+    )

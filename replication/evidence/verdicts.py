@@ -1,0 +1,222 @@
+"""Judge the paper's claims from the trials, by the frozen criteria of :mod:`replication.evidence.claims`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from replication.evidence.claims import Claim, Claims, Judging, criteria_hash
+from replication.evidence.statistics import (
+    compare,
+    holm,
+    mean_prediction,
+    sd_interval,
+    sd_prediction,
+    share_interval,
+    summarise,
+)
+
+REPRODUCED = "reproduced"
+PARTLY = "partly"
+UNDECIDED = "undecided"
+REVERSED = "reversed"
+NOT_REPRODUCED = "not reproduced"
+NOT_TESTABLE = "not testable"
+
+
+def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
+    """Return one row for each claim and reading of Eq. 9, with its verdict.
+
+    Parameters
+    ----------
+    measures
+        Rows of :func:`replication.trials.measures.measure_trials` for all tasks.
+    claims
+        What to judge, and how.
+
+    Returns
+    -------
+    DataFrame
+        `effect` with its 95 % interval `low` to `high` is the claim's statistic, `paper` the
+        published value of it. For published means and SDs, `predicted_low` to `predicted_high` is
+        where ours should lie. `fewer` is the probability that x is below y in one trial each, ties
+        counting half; `power` that of finding an effect as large as the published one. `p_holm` is
+        adjusted over all tests of the table. `why` is empty for what is reproduced or reversed.
+        `criteria` is the hash of the frozen file.
+    """
+    rows = []
+    for claim in claims.claim:
+        x = measures[(measures["task"] == claim.task) & (measures["method"] == claim.x)]
+        if x.empty:
+            raise KeyError(f"no trials of {claim.x} on {claim.task}")
+        for f in [f for f in (*claims.judging.readings, "") if f in set(x["F"])]:
+            rows.append(_row(claim, f, measures, claims.judging))
+    table = pd.DataFrame(rows)
+    table["p_holm"] = np.nan
+    tested = table["p"].notna()
+    table.loc[tested, "p_holm"] = holm(table.loc[tested, "p"].tolist())
+    by_id = {claim.id: claim for claim in claims.claim}
+    judged = [_verdict(by_id[row.id], row, claims.judging) for row in table.itertuples()]
+    table["verdict"], table["why"] = zip(*judged, strict=True)
+    table["criteria"] = criteria_hash()
+    return table
+
+
+def overall(verdicts: Sequence[str]) -> str:
+    """Return the verdict on a claim from those under each reading of Eq. 9.
+
+    A claim of which one reading cannot be tested gets no verdict: what the other reading gives
+    still stands in its row. So a number that made a choice under one reading is never judged.
+
+    Examples
+    --------
+    >>> overall(["reproduced", "undecided"]), overall(["not testable", "reproduced"])
+    ('partly', 'not testable')
+    >>> overall(["undecided", "not reproduced"]), overall(["reversed", "not reproduced"])
+    ('undecided', 'not reproduced')
+    """
+    if NOT_TESTABLE in verdicts:
+        return NOT_TESTABLE
+    if len(set(verdicts)) == 1:
+        return verdicts[0]
+    if REPRODUCED in verdicts:
+        return PARTLY
+    return UNDECIDED if UNDECIDED in verdicts else NOT_REPRODUCED
+
+
+def decide(low: float, high: float, margin: float, direction: str, p: float, level: float) -> str:
+    """Judge an interval and the adjusted p-value of the test beside it, NaN if there is none.
+
+    Examples
+    --------
+    >>> decide(-3.0, -1.0, 0.0, "less", 0.01, 0.05), decide(-3.0, -1.0, 0.0, "less", 0.08, 0.05)
+    ('reproduced', 'undecided')
+    >>> decide(1.0, 3.0, 0.0, "less", 0.01, 0.05), decide(-1.0, 1.0, 0.0, "less", 0.5, 0.05)
+    ('reversed', 'not reproduced')
+    """
+    excluded = not low <= margin <= high
+    rejected = excluded if np.isnan(p) else p < level
+    if excluded != rejected:
+        return UNDECIDED
+    if not excluded:
+        return NOT_REPRODUCED
+    return REPRODUCED if (high < margin) == (direction == "less") else REVERSED
+
+
+def _row(claim: Claim, f: str, measures: pd.DataFrame, judging: Judging) -> dict[str, Any]:
+    x = _trials(measures, claim.task, claim.x, f)
+    y = _trials(measures, claim.task, claim.y, f) if claim.y else x
+    row: dict[str, Any] = {
+        "id": claim.id,
+        "claim": claim.claim,
+        "place": claim.place,
+        "task": claim.task,
+        "F": f,
+        "measure": claim.measure,
+        "statistic": claim.statistic,
+        "x": claim.x,
+        "y": claim.y,
+        "direction": claim.direction,
+        "margin": claim.margin if claim.direction != "inside" else np.nan,
+        "test": claim.test,
+        "n": len(x),
+        "capped": int((x["converged"] == 0).sum() + (claim.y != "") * (y["converged"] == 0).sum()),
+        "paper": claim.paper_effect,
+    }
+    counts = ("effect", "low", "high", "predicted_low", "predicted_high", "fewer", "p", "power")
+    return row | dict.fromkeys(counts, np.nan) | _numbers(claim, x, y)
+
+
+def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]:
+    """Return the effect, its interval and whatever else the claim's statistic gives."""
+    a, b = x[claim.measure].to_numpy(float), y[claim.measure].to_numpy(float)
+    if claim.statistic == "share":
+        share, n = min((values.mean(), len(values)) for values in (a, b))
+        low, high = share_interval(round(share * n), n)
+        return {"effect": share, "low": low, "high": high}
+    done = x["converged"].all() and y["converged"].all()
+    if not done:  # a trial at the cap has no count
+        return {}
+    if claim.statistic in ("mean-difference", "mean"):
+        published = claim.paper_effect if claim.paper else np.nan
+        against = b if claim.y else np.full(len(a), claim.margin)
+        found = compare(a, against, published=published)
+        shift = 0.0 if claim.y else claim.margin
+        return {
+            "effect": found.difference + shift,
+            "low": found.low + shift,
+            "high": found.high + shift,
+            "fewer": found.fewer if claim.y else np.nan,
+            "p": found.p_wilcoxon,
+            "power": found.power,
+        }
+    if claim.statistic == "sd-ratio":
+        found = compare(a, b)
+        return {
+            "effect": found.sd_ratio,
+            "low": found.sd_low,
+            "high": found.sd_high,
+            "p": found.p_spread,
+        }
+    ours = summarise(a, x["converged"])
+    if claim.statistic == "published-run":
+        low, high = np.quantile(a, [0.025, 0.975])
+        return {"effect": ours.median, "low": float(low), "high": float(high)}
+    paper = claim.published(claim.x)
+    if claim.statistic == "published-mean":
+        low, high = mean_prediction(paper.mean, paper.sd, paper.n, ours.n)
+        moments = {"effect": ours.mean, "low": ours.low, "high": ours.high}
+    else:
+        low, high = sd_prediction(paper.sd, paper.n, a)
+        moments = dict(zip(("effect", "low", "high"), (ours.sd, *sd_interval(a)), strict=True))
+    return moments | {"predicted_low": low, "predicted_high": high}
+
+
+def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
+    """Return the verdict on a row, and why it is not a plain one."""
+    used = claim.used.get("all") or claim.used.get(row.F or "all")
+    if used:
+        return NOT_TESTABLE, used
+    if row.n < judging.fewest:
+        return NOT_TESTABLE, f"{row.n} trials; {judging.fewest} are needed"
+    if np.isnan(row.effect) and row.capped:
+        return NOT_TESTABLE, f"{row.capped} trials at the iteration cap"
+    if np.isnan([row.effect, row.low, row.high]).any():
+        return NOT_TESTABLE, "the trials do not vary"
+    if claim.statistic == "published-run":
+        if row.low <= row.paper <= row.high:
+            return REPRODUCED, ""
+        return NOT_REPRODUCED, "the paper's run lies outside the central 95 % of ours"
+    if claim.direction == "inside":
+        if row.predicted_low <= row.effect <= row.predicted_high:
+            return REPRODUCED, ""
+        return NOT_REPRODUCED, "ours lies outside the range that the paper's predicts"
+    found = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
+    excluded = not row.low <= claim.margin <= row.high
+    if found == UNDECIDED and excluded:
+        return found, "the interval excludes the margin, but the test does not reject"
+    if found == UNDECIDED:
+        return found, "the test rejects, but the interval includes the margin"
+    if found != NOT_REPRODUCED:
+        return found, ""
+    if np.isnan(row.paper):
+        return found, "the interval includes the margin"
+    included = "and" if row.low <= row.paper <= row.high else "but not"
+    return found, f"the interval includes the margin, {included} the published effect"
+
+
+def _trials(measures: pd.DataFrame, task: str, method: str, f: str) -> pd.DataFrame:
+    """Return the rows of a method under a reading of Eq. 9, or its only ones without a trace."""
+    own = measures[(measures["task"] == task) & (measures["method"] == method)]
+    chosen = own[own["F"] == f] if f in set(own["F"]) else own[own["F"] == ""]
+    if chosen.empty:
+        raise KeyError(f"no trials of {method} on {task}")
+    return chosen.sort_values("trial")
+
+
+def by_claim(table: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:
+    """Yield each claim's id and rows, in the order of the table."""
+    yield from table.groupby("id", sort=False)

@@ -1,0 +1,1 @@
+"""What the paper says, and the register of what it leaves open."""

@@ -1,0 +1,107 @@
+"""The register of choices: what the paper leaves open, what we chose, and what else is accepted.
+
+The register itself is the data file ``choices.toml``. This module reads it and gives parameter
+dataclasses their fields: a field declared with :func:`choice` takes its default from the register
+and accepts exactly the values that are registered for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from replication.errors import UserError
+
+Value = str | int | float
+
+
+class ChoiceError(UserError):
+    """A parameter has a name or a value that the register does not know."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One entry of the register; ``choices.toml`` explains the fields."""
+
+    id: str
+    place: str
+    open: str
+    default: Value
+    rule: str
+    alternatives: tuple[Value, ...] = ()
+    range: tuple[float, float] | None = None
+    field: str = ""
+    data: str = ""
+    code: str = ""
+
+    @property
+    def accepted(self) -> str:
+        """The accepted values in words, for error messages and tables."""
+        if self.range is not None:
+            low, high = self.range
+            kind = "a whole number" if isinstance(self.default, int) else "a number"
+            return f"{kind} from {low} to {high}"
+        return ", ".join(repr(value) for value in (self.default, *self.alternatives))
+
+    def check(self, value: Any) -> Value:
+        """Return `value` in the type of the default.
+
+        Raises
+        ------
+        ChoiceError
+            If the register does not accept the value.
+        """
+        kind = type(self.default)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        fits = isinstance(value, str) if kind is str else number
+        if fits and self.range is not None:
+            low, high = self.range
+            fits = low <= value <= high and (kind is float or value == int(value))
+        elif fits:
+            fits = value in (self.default, *self.alternatives)
+        if not fits:
+            raise ChoiceError(
+                f"{self.field} = {value!r} is not accepted (choice {self.id}): use {self.accepted}"
+            )
+        return kind(value)
+
+
+@cache
+def load_choices() -> dict[str, Choice]:
+    """Return the register: each :class:`Choice` by its id, in the order of the file.
+
+    Raises
+    ------
+    ChoiceError
+        If the file has an entry with an unknown key or an id twice.
+    """
+    text = resources.files("replication.paper").joinpath("choices.toml").read_text(encoding="utf-8")
+    entries: dict[str, Choice] = {}
+    for entry in tomllib.loads(text)["choice"]:
+        lists = {key: tuple(entry[key]) for key in ("alternatives", "range") if key in entry}
+        try:
+            registered = Choice(**{**entry, **lists})
+        except TypeError as error:
+            raise ChoiceError(f"choices.toml, entry {entry.get('id')!r}: {error}") from None
+        if registered.id in entries:
+            raise ChoiceError(f"choices.toml has the id {registered.id!r} twice")
+        entries[registered.id] = registered
+    return entries
+
+
+def choice(id: str) -> Any:
+    """Declare a dataclass field that holds the registered choice `id`, with its default."""
+    return dataclasses.field(default=load_choices()[id].default, metadata={"choice": id})
+
+
+class Chosen:
+    """Base of the parameter dataclasses: each field is a registered choice and is checked."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            entry = load_choices()[field.metadata["choice"]]
+            object.__setattr__(self, field.name, entry.check(getattr(self, field.name)))

@@ -1,0 +1,322 @@
+"""Moving figures with buttons and a slider, as HTML that needs nothing from elsewhere.
+
+The player is Matplotlib's own. What moves here is the agent while it learns, iteration by
+iteration: where it goes, which rewards it has been given, and how far it is from the expert.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.animation import FuncAnimation
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+from PIL import Image
+
+from replication.demos.model import Demos
+from replication.envs.maze import as_maze
+from replication.envs.soccer import rules
+from replication.envs.soccer.field import SoccerField
+from replication.evidence.experiments import F_LABELS, Key
+from replication.irl import Trial, get_method
+from replication.report.field_figures import _draw_field, trace
+from replication.report.figures import COLOURS, _draw_map, _legend_below, _places, _style
+
+Floats = NDArray[np.float64]
+
+DPI = 100
+FRAMES_A_SECOND = 3
+MOST_FRAMES = 120
+REWARD_MAP = "PiYG"
+
+
+@dataclass(frozen=True)
+class Course:
+    """One trial, iteration by iteration: entry i is what there is after i weight updates.
+
+    Attributes
+    ----------
+    label, colour
+        How the method is named and drawn.
+    errors
+        d (Eq. 6), [n + 1].
+    ways
+        Where the greedy agent goes, x and y of each step: n + 1 arrays [T + 1, 2].
+    weights
+        Reward weights of what is coloured, [n + 1, cell or pair].
+    """
+
+    label: str
+    colour: str
+    errors: Floats
+    ways: tuple[Floats, ...]
+    weights: Floats
+
+    @property
+    def iterations(self) -> int:
+        """Number of weight updates."""
+        return len(self.errors) - 1
+
+
+def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
+    """Return what a player shows of some trials that kept their snapshots.
+
+    Parameters
+    ----------
+    demos
+        Where they learned: a maze or the soccer field.
+    trials
+        By method and F index.
+    """
+    found = []
+    for (method, f_index), trial in trials.items():
+        assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
+        label = get_method(method).label + (f", {F_LABELS[f_index]}" if f_index else "")
+        found.append(
+            Course(
+                label,
+                COLOURS[method],
+                trial.errors,
+                tuple(_way(demos, episode.states, episode.actions) for episode in trial.episodes),
+                _shown_weights(demos, trial.snapshots.weights),
+            )
+        )
+    return found
+
+
+def course_numbers(shown: Sequence[Course]) -> pd.DataFrame:
+    """Return what the player shows in numbers: a row for each method and iteration."""
+    rows = [
+        {
+            "method": one.label,
+            "iteration": i,
+            "d": one.errors[i],
+            "moves": len(one.ways[i]) - 1,
+            "last x": one.ways[i][-1, 0],
+            "last y": one.ways[i][-1, 1],
+            "lowest weight": one.weights[i].min(),
+            "highest weight": one.weights[i].max(),
+        }
+        for one in shown
+        for i in range(one.iterations + 1)
+    ]
+    return pd.DataFrame(rows)
+
+
+def describe_courses(shown: Sequence[Course]) -> str:
+    """Return the player in words."""
+    ends = "; ".join(
+        f"{one.label}: "
+        + (f"d = 0 after {one.iterations}" if one.errors[-1] == 0 else f"d = {one.errors[-1]:.3g}")
+        for one in shown
+    )
+    return (
+        "The agent's way, its reward weights and its error, iteration by iteration, one trial of "
+        f"each method side by side. Iterations to the end: {ends}."
+    )
+
+
+def learning_player(demos: Demos, shown: Sequence[Course]) -> str:
+    """Return a player with a frame for each iteration, the methods side by side.
+
+    A method that has converged keeps its last frame until all have. Of very many iterations some
+    are left out, evenly.
+    """
+    with _style():
+        figure = Figure(figsize=(2.75 * len(shown) + 0.5, 4.35), dpi=DPI, layout="constrained")
+        _Canvas(figure)
+        grid = figure.subplots(2, len(shown), height_ratios=(3, 1), squeeze=False)
+        # Colours show the root of a weight's size: one wrong loop outweighs all that is learned.
+        most = np.sqrt(max(np.abs(one.weights).max() for one in shown)) or 1.0
+        norm = Normalize(-most, most)
+        panels = [_Panel(demos, one, norm, *grid[:, at]) for at, one in enumerate(shown)]
+        longest = max(one.iterations for one in shown)
+        highest = max(one.errors.max() for one in shown)
+        for curve in grid[1]:
+            curve.set(xlim=(0, longest), ylim=(0, highest * 1.05), xlabel="iteration")
+            curve.label_outer()
+        grid[1, 0].set_ylabel("error d")
+        bar = figure.colorbar(
+            ScalarMappable(norm, REWARD_MAP), ax=grid[0].tolist(), shrink=0.8, pad=0.01
+        )
+        bar.set_ticks([-most, 0, most], labels=["avoid", "0", "seek"])
+        bar.set_label("reward weight (√ of its size)", labelpad=-2)
+        _legend_below(
+            figure,
+            [
+                Line2D([], [], color="0.1", label="the agent's way", lw=1.6),
+                Line2D([], [], color="0.1", marker="o", ms=4, lw=0, label="where it ends"),
+                Line2D([], [], color="0.45", ls=":", lw=1.4, label="the expert's way"),
+            ],
+        )
+
+        def draw(frame: int) -> list[Any]:
+            for panel in panels:
+                panel.draw(frame)
+            return []
+
+        draw(longest)
+        for _ in range(2):  # the first layout does not know yet how high the titles stand
+            figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        animation = FuncAnimation(
+            figure,
+            draw,
+            frames=np.linspace(0, longest, min(longest + 1, MOST_FRAMES)).round().astype(int),
+            cache_frame_data=False,
+        )
+    return player(animation, describe_courses(shown), frames_a_second=FRAMES_A_SECOND)
+
+
+class _Canvas(FigureCanvasAgg):
+    """Draws a frame when it is saved, and not once more before."""
+
+    def draw_idle(self, *_: Any, **__: Any) -> None:
+        """Draw nothing."""
+
+
+class _Panel:
+    """One method in a player: the map above, the error below."""
+
+    def __init__(
+        self, demos: Demos, course: Course, norm: Normalize, above: Axes, below: Axes
+    ) -> None:
+        self.course = course
+        self.above = above
+        corners = _backdrop(demos, above)
+        self.coloured = np.flatnonzero(course.weights.any(axis=0))
+        self.rewards = PolyCollection(
+            list(corners[self.coloured]), cmap=REWARD_MAP, norm=norm, lw=0, zorder=1
+        )
+        above.add_collection(self.rewards, autolim=False)
+        expert = _way(demos, demos.correct[0].states, demos.correct[0].actions)
+        above.plot(*expert.T, color="0.45", ls=":", lw=1.4, zorder=4)
+        (self.way,) = above.plot([], [], color="0.1", lw=1.6, solid_capstyle="round", zorder=6)
+        (self.end,) = above.plot([], [], "o", color="0.1", ms=4, zorder=6)
+        below.plot(course.errors, color=course.colour, lw=0.8, alpha=0.35)
+        (self.error,) = below.plot([], [], color=course.colour, lw=1.4)
+        (self.now,) = below.plot([], [], "o", color=course.colour, ms=4, clip_on=False)
+
+    def draw(self, frame: int) -> None:
+        """Show the state after so many iterations, or the last one."""
+        one, i = self.course, min(frame, self.course.iterations)
+        weights = one.weights[i, self.coloured]
+        self.rewards.set_array(np.sign(weights) * np.sqrt(np.abs(weights)))
+        self.way.set_data(*one.ways[i].T)
+        self.end.set_data(*one.ways[i][-1:].T)
+        self.error.set_data(np.arange(i + 1), one.errors[: i + 1])
+        self.now.set_data([i], [one.errors[i]])
+        status = f"iteration {i}: {len(one.ways[i]) - 1} moves, d = {one.errors[i]:.2f}"
+        if i == one.iterations:
+            status = f"ends after {i} iterations, d = {one.errors[i]:.3g}"
+        self.above.set_title(f"{one.label}\n{status}", loc="left", fontsize=8)
+
+
+def _backdrop(demos: Demos, panel: Axes) -> Floats:
+    """Draw where the agent moves; return the corners of what rewards colour, [shape, corner, 2]."""
+    if isinstance(demos.environment, SoccerField):
+        _draw_field(panel)
+        panel.set(xticks=[], yticks=[])
+        x = np.linspace(0, rules.WIDTH, rules.COLUMNS + 1)
+        y = np.linspace(0, rules.HEIGHT, rules.ROWS + 1)
+        left, low = (one.ravel() for one in np.meshgrid(x[:-1], y[:-1], indexing="ij"))
+        right, high = (one.ravel() for one in np.meshgrid(x[1:], y[1:], indexing="ij"))
+        corners = [(left, low), (right, low), (right, high), (left, high)]
+        return np.stack([np.stack(corner, axis=1) for corner in corners], axis=1)
+    maze = as_maze(demos.environment)
+    _draw_map(panel, maze, grid=False)
+    panel.set(xticks=[], yticks=[], xlabel="", ylabel="", anchor="N")
+    centre = np.stack(_places(maze, np.arange(maze.n_states)), axis=1)
+    # A cell's four triangles are its actions: up, down, right, left.
+    sides = 0.5 * np.array(
+        [((-1, 1), (1, 1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1)), ((-1, -1), (-1, 1))]
+    )
+    shapes = np.zeros((maze.n_states, maze.n_actions, 3, 2)) + centre[:, None, None]
+    shapes[:, :, 1:] += sides
+    return shapes.reshape(-1, 3, 2)
+
+
+def _way(demos: Demos, states: NDArray[np.int64], actions: NDArray[np.int64]) -> Floats:
+    """Return where an episode leads, x and y [T + 1, 2]."""
+    if isinstance(demos.environment, SoccerField):
+        return trace(demos.environment, actions).poses[:, :2]
+    return np.stack(_places(as_maze(demos.environment), states), axis=1).astype(float)
+
+
+def _shown_weights(demos: Demos, weights: Floats) -> Floats:
+    """Return what is coloured: the weight of each pair in a maze, of each cell in soccer.
+
+    Actions in soccer have no side of the cell: a cell shows its weight of greatest size.
+    """
+    if not isinstance(demos.environment, SoccerField):
+        return weights.reshape(len(weights), -1)
+    cells = weights.reshape(len(weights), rules.COLUMNS * rules.ROWS, -1)
+    greatest = np.abs(cells).argmax(axis=2)
+    return np.take_along_axis(cells, greatest[..., None], axis=2)[..., 0]
+
+
+# --- the player ------------------------------------------------------------------------------
+
+_ICONS = {
+    "fa-minus": "&minus;",
+    "fa-fast-backward": "|&lt;",
+    "fa-step-backward": "&lt;",
+    "fa-play fa-flip-horizontal": "&#9664;",
+    "fa-pause": "||",
+    "fa-play": "&#9654;",
+    "fa-step-forward": "&gt;",
+    "fa-fast-forward": "&gt;|",
+    "fa-plus": "+",
+}
+
+
+def player(animation: FuncAnimation, description: str, *, frames_a_second: int) -> str:
+    """Return an animation as HTML with buttons and a slider, which needs nothing from elsewhere.
+
+    Matplotlib's player loads its icons from the web, has a random id, and names neither picture nor
+    slider for those who cannot see them.
+
+    Parameters
+    ----------
+    animation
+        What moves.
+    description
+        What it shows, in words.
+    frames_a_second
+        How fast it plays at first.
+    """
+    with _style(), mpl.rc_context({"savefig.dpi": DPI}):
+        text = animation.to_jshtml(fps=frames_a_second, default_mode="once")
+    text = re.sub(r"<link[^>]*>\s*", "", text)
+    text = re.sub(r'<i class="fa ([^"]*)"></i>', lambda match: _ICONS[match[1]], text)
+    text = re.sub(r'(?<=data:image/png;base64,)[^"]*', lambda match: _smaller(match[0]), text)
+    (random_id,) = re.findall(r'<img id="_anim_img(\w+)"', text)
+    content = hashlib.sha256(text.replace(random_id, "").encode()).hexdigest()
+    text = text.replace('<img id="', f'<img alt="{html.escape(description)}" id="')
+    text = text.replace('type="range"', 'type="range" aria-label="Frame"')
+    return text.replace(random_id, content[: len(random_id)])
+
+
+def _smaller(encoded: str) -> str:
+    """Return a PNG, in base 64, in 256 colours: a fourth of the bytes, and it looks the same."""
+    with Image.open(io.BytesIO(base64.b64decode(encoded.replace("\\\n", "")))) as frame:
+        few = frame.convert("RGB").quantize(method=Image.Quantize.FASTOCTREE)
+    buffer = io.BytesIO()
+    few.save(buffer, format="PNG", optimize=True)
+    return base64.b64encode(buffer.getvalue()).decode()

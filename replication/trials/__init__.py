@@ -1,0 +1,1 @@
+"""Many seeds of many conditions, each trial computed once and stored."""

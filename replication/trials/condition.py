@@ -1,0 +1,104 @@
+"""A condition of an experiment: demonstrations, a method and parameters, ready to run any trial."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+
+import numpy as np
+
+from replication.demos.model import Demos, content_hash
+from replication.envs.environment import Environment
+from replication.errors import unknown
+from replication.irl.agent import Agent
+from replication.irl.expectations import expert_expectations, visited
+from replication.irl.loop import Answer, Request, Trial, iterate
+from replication.irl.methods import Method, get_method
+from replication.paper.params import Params
+from replication.paper.register import ChoiceError
+
+AGENTS = {"maze": "replication.trials.maze_agent", "soccer": "replication.trials.soccer_agent"}
+"""The module that makes the agent for each kind of environment.
+
+They are named, not imported, so that the key of a trial covers the code of its own task only.
+"""
+
+
+def make_agent(environment: Environment, params: Params) -> Agent:
+    """Return the agent that learns in `environment`.
+
+    Raises
+    ------
+    ChoiceError
+        If there is none for such an environment, or it cannot do what the parameters ask for.
+    """
+    if environment.kind not in AGENTS:
+        raise ChoiceError(unknown(environment.kind, AGENTS, "kind of environment"))
+    agent: Agent = import_module(AGENTS[environment.kind]).make_agent(environment, params)
+    return agent
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What all trials of one condition have in common.
+
+    Attributes
+    ----------
+    demos
+        All demonstrations of a task; `params.demonstrations` selects among the incorrect ones.
+    method
+        Name in the registry of methods.
+    params
+        Everything else that determines a trial but its seed.
+
+    Raises
+    ------
+    ChoiceError
+        If the method is unknown.
+    DemoError
+        If the demonstrations have none of a kind that the parameters ask for.
+    """
+
+    demos: Demos
+    method: str
+    params: Params
+
+    def __post_init__(self) -> None:
+        _ = self.selected  # a condition that cannot run is refused when it is made
+
+    @cached_property
+    def selected(self) -> Demos:
+        """The demonstrations that the method is given."""
+        uses = self.rule.uses_incorrect
+        return self.demos.select(self.params.demonstrations.incorrect if uses else "none")
+
+    @cached_property
+    def selected_hash(self) -> str:
+        """The hash of what the method is given, see :func:`replication.demos.model.content_hash`."""
+        return content_hash(self.selected)
+
+    @property
+    def rule(self) -> Method:
+        """The method itself."""
+        return get_method(self.method)
+
+    @property
+    def choices(self) -> str:
+        """The registered choices that differ from the defaults: `ID=value`, parted by blanks."""
+        return " ".join(f"{id}={value}" for id, value in self.params.differences().items())
+
+    @cached_property
+    def agent(self) -> Agent:
+        """The learner that the loop is given."""
+        return make_agent(self.demos.environment, self.params)
+
+    def trial(
+        self, *, seed: np.random.SeedSequence, keep: bool = False
+    ) -> Generator[Request, Answer, Trial]:
+        """Return one trial, ready for :func:`replication.irl.run`."""
+        shape, gamma = self.agent.shape, self.params.learner.gamma
+        mu_e = expert_expectations(self.selected.correct, gamma=gamma, shape=shape)
+        mu_b = visited(self.selected.incorrect, shape=shape)
+        return iterate(self.agent, self.rule, mu_e, mu_b, self.params, seed=seed, keep=keep)
