@@ -8,6 +8,7 @@ import pytest
 
 from replication import Demos, Maze, demonstrate, files, load_demos
 from replication.files import PROJECT, write_file
+from replication.pipeline import execute as execution
 from replication.pipeline.notebook import Notebook
 
 SMALL = """
@@ -42,7 +43,7 @@ def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         write_file(executed, str(nbformat.writes(notebook.load())))
 
     monkeypatch.setattr(files, "PROJECT", tmp_path)
-    monkeypatch.setattr(execute, "execute", execute)
+    monkeypatch.setattr(execution, "execute", execute)
     (tmp_path / "environment.lock").touch()
     return tmp_path
 

@@ -29,7 +29,7 @@ from replication.files import PROJECT
 from replication.irl import METHODS, READINGS
 from replication.paper.published import FIGURE_5, FIGURE_12, TABLE_1, TABLE_2, Published
 
-TEXT = (PROJECT / "replication" / "claims.toml").read_text(encoding="utf-8")
+TEXT = (PROJECT / "replication" / "evidence" / "claims.toml").read_text(encoding="utf-8")
 DOCUMENT = tomllib.loads(TEXT)
 CLAIMS = load_claims().claim
 NAMES = [one.id for one in CLAIMS]

@@ -13,8 +13,9 @@ from replication.demos import schema
 from replication.demos.checks import DemoError
 from replication.demos.schema import MazeFields, json_schema, read_fields
 from replication.envs.maze import ACTIONS, Maze
+from replication.files import PROJECT
 
-DATA = Path(__file__).parent.parent / "data" / "demos"
+DATA = PROJECT / "data" / "demos"
 STORED = sorted(path for path in DATA.glob("*.json") if path.name != "schema.json")
 
 EXAMPLE: dict[str, Any] = {

@@ -36,7 +36,7 @@ from replication.paper.register import ChoiceError, load_choices
 from replication.trials.condition import Condition
 from replication.trials.measures import marked_pairs
 
-TEXT = (PROJECT / "replication" / "specifications.toml").read_text(encoding="utf-8")
+TEXT = (PROJECT / "replication" / "evidence" / "specifications.toml").read_text(encoding="utf-8")
 PLAN = load_specifications()
 CAP = PLAN.iteration_cap
 SINGLE = single_specifications(PLAN.mazes.single.choices)

@@ -17,8 +17,9 @@ from replication.demos.checks import DemoError, DemoWarning
 from replication.demos.files import check_demos, load_demos, save_demos
 from replication.demos.model import Demo, Demos, content_hash
 from replication.envs.maze import ACTIONS, Maze
+from replication.files import PROJECT
 
-DATA = Path(__file__).parent.parent / "data" / "demos"
+DATA = PROJECT / "data" / "demos"
 STORED = sorted(path for path in DATA.glob("*.json") if path.name != "schema.json")
 
 EXAMPLE: dict[str, Any] = {

@@ -31,7 +31,7 @@ from typer.testing import CliRunner
 
 from replication import Demos, cli, demonstrate, files, save_demos
 from replication.envs.maze import Maze
-from replication.files import write_file
+from replication.files import PROJECT, write_file
 from replication.paper.params import Params
 from replication.pipeline.notebook import Notebook
 from replication.trials.condition import Condition
@@ -122,7 +122,7 @@ def _snapshot() -> Path:
     """Copy the package once: whoever edits it while the tests run does not disturb them."""
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    project = Path(__file__).parents[1]
+    project = PROJECT
     shutil.copytree(project / "replication", folder / "replication")
     shutil.copy2(project / "environment.lock", folder)
     subprocess.run([sys.executable, "-c", WARM], cwd=folder, check=True, timeout=600)
@@ -407,7 +407,7 @@ def test_ctrl_c_keeps_what_is_finished(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
     """However verify is ended, so are the processes that compute for it."""
-    demos = Path(__file__).parents[1] / "data" / "demos" / "open_maze.json"
+    demos = PROJECT / "data" / "demos" / "open_maze.json"
     shutil.copy2(demos, checkout.folder / "data" / "demos")
     rows = [f"open-maze,unified,{k},1,9,True,9,,sha256:0\n" for k in range(2000)]
     (checkout.folder / "figures").mkdir()
@@ -638,7 +638,7 @@ def test_the_cluster_of_the_readme(checkout: Checkout, reference: Reference) -> 
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
-    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    text = (PROJECT / "README.md").read_text(encoding="utf-8")
     commands = re.findall(r"^ +\.venv/bin/dask (.+) &$", text.replace("8786", port), re.MULTILINE)
     environment = os.environ | {
         "FAULTS_MARK": checkout.mark,
@@ -999,7 +999,7 @@ print(json.dumps(count))
 
 def _check_mutants(folder: Path, small: Demos, bounds: list[tuple[int, int]]) -> None:
     save_demos(small, folder / "small.json")
-    stored = Path(__file__).parents[1] / "data" / "demos"
+    stored = PROJECT / "data" / "demos"
     sources = [folder / "small.json"]
     sources += [stored / f"{name}.json" for name in ("obstacle_maze", "soccer", "open_maze")]
     running = [

@@ -20,6 +20,7 @@ from replication.files import PROJECT, write_file
 from replication.paper.params import Params
 from replication.paper.register import load_choices
 from replication.pipeline import provenance
+from replication.pipeline import verify as verification
 from replication.pipeline.plan import prepare
 from replication.pipeline.verify import (
     sampled_trials,
@@ -221,7 +222,7 @@ def test_rows_of_other_tasks_are_left_out(out: Path) -> None:
 
 def test_one_trial_in_twenty_is_sampled() -> None:
     """The sample is 5 %."""
-    assert verify.EVERY == 20
+    assert verification.EVERY == 20
 
 
 # --- the conditions behind rows ----------------------------------------------------------------

@@ -15,6 +15,7 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Demos
+from replication.files import PROJECT
 from replication.irl import Trial
 from replication.paper.params import Params
 from replication.trials.condition import Condition
@@ -131,8 +132,8 @@ def test_a_worker_with_other_code_is_refused(
     small_demos: Demos, tmp_path: Path, start: StartCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Workers whose code differs are found out, and nothing of theirs is stored."""
-    shutil.copytree(Path(__file__).parents[1] / "replication", tmp_path / "other" / "replication")
-    with (tmp_path / "other" / "replication" / "compute.py").open("a") as file:
+    shutil.copytree(PROJECT / "replication", tmp_path / "other" / "replication")
+    with (tmp_path / "other" / "replication" / "trials" / "compute.py").open("a") as file:
         file.write("\nCHANGED = True\n")
     monkeypatch.setenv(SCHEDULER, start(str(tmp_path / "other")).address)
     with pytest.raises(WorkerError, match=r"other code.*install the same commit"):

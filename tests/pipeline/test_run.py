@@ -24,7 +24,8 @@ from replication import files as project_files
 from replication.envs.maze import as_maze
 from replication.evidence import claims, specifications
 from replication.files import write_file
-from replication.pipeline import execute, provenance
+from replication.pipeline import execute as execution
+from replication.pipeline import provenance
 from replication.pipeline.folders import executed_folder
 from replication.pipeline.freshness import read_runs
 from replication.pipeline.notebook import Notebook, NotebookError, RunError
@@ -138,13 +139,16 @@ def test_bad_plans_are_refused_before_any_notebook_runs(
     text = module._text()
     assert old in text
     monkeypatch.setattr(module, "_text", lambda: text.replace(old, new, 1))
-    cached = claims.claims if module is claims else specifications.declared
+    cached = claims.load_claims if module is claims else specifications.load_specifications
     cached.cache_clear()
     try:
         with monkeypatch.context() as patch:
             patch.setattr(papermill, "execute_notebook", lambda *_, **__: pytest.fail("executed"))
             with pytest.raises(ValueError, match=f"^{name}.toml, {said}"):
-                run(write(name="first"), write(name="last", inputs=[f"replication/{name}.toml"]))
+                run(
+                    write(name="first"),
+                    write(name="last", inputs=[f"replication/evidence/{name}.toml"]),
+                )
         run(write(name="first"))
     finally:
         cached.cache_clear()
@@ -214,7 +218,7 @@ def test_run_publishes_what_is_declared(
 
     A foreign kernel of the same name, and the user's start-up files, take no part.
     """
-    foreign = tmp_path / "jupyter" / "kernels" / execute.KERNEL
+    foreign = tmp_path / "jupyter" / "kernels" / execution.KERNEL
     foreign.mkdir(parents=True)
     spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
     (foreign / "kernel.json").write_text(json.dumps(spec))
@@ -310,7 +314,7 @@ def test_failure_leaves_earlier_outputs(
     assert ("KeyError" in caught.value.details) == ("KeyError" in code)
 
 
-@pytest.mark.parametrize("ename", sorted(execute.MISTAKES))
+@pytest.mark.parametrize("ename", sorted(execution.MISTAKES))
 def test_refusal_in_a_cell_is_the_users_mistake(
     write: Write, run: Run, tmp_path: Path, ename: str
 ) -> None:
@@ -377,7 +381,7 @@ def test_only_the_start_of_a_kernel_is_tried_again(
     begun[:] = [False] * 2
     with pytest.raises(RunError, match="the kernel does not start: Kernel died"):
         run(write())
-    assert len(begun) == 2 + execute.STARTS
+    assert len(begun) == 2 + execution.STARTS
 
 
 def test_publishing_is_all_or_nothing(
@@ -439,7 +443,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
                 names |= {**values, "out": str(stage)}
         write_file(executed, str(nbformat.writes(node)))
 
-    monkeypatch.setattr(execute, "execute", execute)
+    monkeypatch.setattr(execution, "execute", execute)
     return begun
 
 
@@ -747,14 +751,14 @@ def test_rows_that_were_lost_are_made_again(
         write(append, name=name, parameters=f'out = "x"\nname = "{name}"', merged=["rows.csv"])
         for name in ("one", "two", "three")
     ]
-    run(*files, jobs=None)
+    run(*paths, jobs=None)
     (project / "figures" / "rows.csv").unlink()
     run(paths[0], jobs=None)
     begun.clear()
-    run(*files, jobs=None)
+    run(*paths, jobs=None)
     assert begun == ["two", "three"]
     assert (project / "figures" / "rows.csv").read_text() == "one three two"
-    run(*files, jobs=None)
+    run(*paths, jobs=None)
     assert begun == ["two", "three"]
 
 
