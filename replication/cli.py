@@ -309,7 +309,7 @@ def learn(
     from replication.fit import fit
     from replication.irl import get_method
     from replication.paper.params import Params
-    from replication.report import figures
+    from replication.report import figures, style
 
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
@@ -324,7 +324,7 @@ def learn(
     result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
     saved = result.save(f"{stem}.json")
-    figures.save_figure(figures.fit_figure(result), stem, formats=("png",))
+    style.save_figure(figures.fit_figure(result), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     typer.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "

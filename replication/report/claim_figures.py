@@ -29,7 +29,7 @@ from replication.evidence.verdicts import REPRODUCED, by_claim, overall
 from replication.evidence.verdicts import REVERSED as VERDICT_REVERSED
 from replication.paper.published import Published
 from replication.paper.register import Value
-from replication.report.figures import _figure, _legend_below, _settled
+from replication.report.style import canvas, legend_below, settled
 
 OUTCOMES = {HOLDS: "#0072B2", OPEN: "#9A9A9A", REVERSED: "#D55E00"}
 MARKS = {HOLDS: "o", OPEN: "s", REVERSED: "D"}
@@ -55,7 +55,7 @@ UNITS = {
 # --- the verdicts --------------------------------------------------------------------------------
 
 
-@_settled
+@settled
 def claims_figure(table: pd.DataFrame) -> Figure:
     """Draw the verdicts on the comparative claims, a panel for each unit.
 
@@ -68,7 +68,7 @@ def claims_figure(table: pd.DataFrame) -> Figure:
     units = [unit for unit in dict.fromkeys(UNITS.values()) if unit in set(table["unit"])]
     parts = [table[table["unit"] == unit] for unit in units]
     sizes = [part["id"].nunique() for part in parts]
-    figure, axes = _figure(
+    figure, axes = canvas(
         len(units), 1, height=0.4 + 0.37 * len(units) + 0.29 * sum(sizes), height_ratios=sizes
     )
     for panel, unit, part in zip(axes, units, parts, strict=True):
@@ -80,7 +80,7 @@ def claims_figure(table: pd.DataFrame) -> Figure:
         _handle("margin", "", "0.25", lw=1),
         Patch(color="0.93", lw=0, label="claimed side"),
     ]
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -125,7 +125,7 @@ def _draw_verdicts(panel: Axes, part: pd.DataFrame) -> None:
 # --- all choices at once -------------------------------------------------------------------------
 
 
-@_settled
+@settled
 def curve_figure(
     effects: pd.DataFrame, specifications: Sequence[Specification], claim: Claim
 ) -> Figure:
@@ -150,7 +150,7 @@ def curve_figure(
     rows = [(id, value) for id, some in values.items() for value in some]
     y = _blocks([id for id, _ in rows])
     matrix_height = 0.123 * (y[-1] + 1)
-    figure, grid = _figure(
+    figure, grid = canvas(
         2,
         2,
         height=3.0 + matrix_height,
@@ -188,7 +188,7 @@ def curve_figure(
     margin = f"margin ({_number(claim.margin)})"
     handles = _outcome_handles("o", margin, capped=bool((part["capped"] > 0).any()))
     handles.append(_handle("holds, over all", "", OUTCOMES[HOLDS], lw=0.8, ls=":"))
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -264,7 +264,7 @@ def _draw_curve(panel: Axes, part: pd.DataFrame, claim: Claim) -> None:
 # --- one choice at a time ------------------------------------------------------------------------
 
 
-@_settled
+@settled
 def single_figure(effects: pd.DataFrame, claims: Sequence[Claim]) -> Figure:
     """Draw the effects with one choice changed, a row for each value and a panel for each claim.
 
@@ -279,7 +279,7 @@ def single_figure(effects: pd.DataFrame, claims: Sequence[Claim]) -> Figure:
     names = parts[0]["specification"].tolist()
     rows: list[tuple[str, str]] = [(*name.split("=", 1), "")[:2] for name in names]
     y = _blocks([id for id, _ in rows])
-    figure, axes = _figure(1, len(claims), height=1.5 + 0.128 * (y[-1] + 1), sharey=True)
+    figure, axes = canvas(1, len(claims), height=1.5 + 0.128 * (y[-1] + 1), sharey=True)
     for panel, claim, part in zip(axes, claims, parts, strict=True):
         part = part.set_index("specification").loc[names].assign(y=y)
         _scale(panel, "x", claim.statistic, part["effect"])
@@ -304,7 +304,7 @@ def single_figure(effects: pd.DataFrame, claims: Sequence[Claim]) -> Figure:
     capped = any((part["capped"] > 0).any() for part in parts)
     handles = _outcome_handles("", "margin", capped=capped)
     handles.append(_handle("default", "", "0.1", lw=1, ls=(0, (4, 2))))
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -331,7 +331,7 @@ def _single(effects: pd.DataFrame, claim: Claim) -> pd.DataFrame:
 # --- which choices matter ------------------------------------------------------------------------
 
 
-@_settled
+@settled
 def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
     """Draw which choices account for the variance of each claim's effect, and what becomes of it.
 
@@ -345,7 +345,7 @@ def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
     others = [name for name in ("noise", "rest") if name in set(shares["choice"])]
     choices = [name for name in dict.fromkeys(shares["choice"]) if name not in others]
     grid = shares.pivot(index="claim", columns="choice", values="share").reindex(outcomes.index)
-    figure, axes = _figure(
+    figure, axes = canvas(
         1, 3, height=1.7 + 0.32 * len(grid), sharey=True, width_ratios=(len(choices), 2, 5)
     )
     _pad(figure, wspace=0.02, h_pad=0.08)
@@ -382,7 +382,7 @@ def shares_figure(shares: pd.DataFrame, outcomes: pd.DataFrame) -> Figure:
     axes[2].spines[:].set_visible(False)
     axes[2].tick_params(which="both", length=0, labelleft=False)
     axes[1].tick_params(labelleft=False)
-    _legend_below(figure, [Patch(color=colour, label=name) for name, colour in OUTCOMES.items()])
+    legend_below(figure, [Patch(color=colour, label=name) for name, colour in OUTCOMES.items()])
     return figure
 
 
@@ -402,7 +402,7 @@ def describe_shares(shares: pd.DataFrame, outcomes: pd.DataFrame) -> str:
 # --- calibration, and the number of incorrect demonstrations ------------------------------------
 
 
-@_settled
+@settled
 def calibration_figure(table: pd.DataFrame, published: Published) -> Figure:
     """Draw the SD against the mean of each point of the calibration grid.
 
@@ -413,7 +413,7 @@ def calibration_figure(table: pd.DataFrame, published: Published) -> Figure:
     published
         The pair that the defaults were chosen for.
     """
-    figure, (panel,) = _figure(1, 1, height=4.3)
+    figure, (panel,) = canvas(1, 1, height=4.3)
     shapes = sorted(set(table["DEMO-SHAPE"]), key=_order)
     colours = dict(
         zip(shapes, colormaps["viridis_r"](np.linspace(0.08, 1, len(shapes))), strict=True)
@@ -434,7 +434,7 @@ def calibration_figure(table: pd.DataFrame, published: Published) -> Figure:
     handles += [_handle(f"TIES {ties}", mark, "0.4", lw=0) for ties, mark in marks.items()]
     star = f"published ({published.mean:.2f}, {published.sd:.2f})"
     handles.append(_handle(star, "*", "#D0021B", ms=11, mfc="white", lw=0))
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -477,7 +477,7 @@ def _label_in_free_corner(panel: Axes, table: pd.DataFrame, row: pd.Series) -> N
     )
 
 
-@_settled
+@settled
 def numbers_figure(table: pd.DataFrame, published: float) -> Figure:
     """Draw the iterations saved against the number of marked pairs.
 
@@ -489,7 +489,7 @@ def numbers_figure(table: pd.DataFrame, published: float) -> Figure:
     published
         The published saving.
     """
-    figure, (panel,) = _figure(1, 1, height=3.4)
+    figure, (panel,) = canvas(1, 1, height=3.4)
     pairs = table.drop_duplicates("pairs").sort_values("pairs")
     linear = float(pairs["pairs"][pairs["pairs"] > 0].min())
     panel.set_xscale("symlog", linthresh=linear, linscale=0.3)
@@ -509,7 +509,7 @@ def numbers_figure(table: pd.DataFrame, published: float) -> Figure:
     handles = _reading_handles(table)
     handles.append(Patch(color="0.4", alpha=0.25, lw=0, label="95 % interval of the mean"))
     handles.append(_handle("the paper's saving", "", "0.3", lw=1, ls=(0, (4, 2))))
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 

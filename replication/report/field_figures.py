@@ -29,15 +29,15 @@ from replication.envs.soccer import rules
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.field import SoccerField
 from replication.files import write_file
-from replication.report.figures import (
+from replication.report.style import (
     CORRECT_COLOUR,
     KIND_COLOURS,
     OTHER_KIND_COLOUR,
     WIDTH,
-    _figure,
-    _legend_below,
-    _settled,
-    _style,
+    canvas,
+    legend_below,
+    settled,
+    style,
 )
 
 Floats = NDArray[np.float64]
@@ -239,10 +239,10 @@ def _listed(values: ArrayLike) -> str:
 # --- still figures ---------------------------------------------------------------------------
 
 
-@_settled
+@settled
 def field_figure(field: SoccerField) -> Figure:
     """Draw the field from above, at the start of an episode (Fig. 10)."""
-    figure, (panel,) = _figure(1, 1, height=5.95)
+    figure, (panel,) = canvas(1, 1, height=5.95)
     _draw_field(panel, small=False)
     _draw_grid(panel)
     world = FastSoccerWorld(field.params)
@@ -273,7 +273,7 @@ def field_figure(field: SoccerField) -> Figure:
     return figure
 
 
-@_settled
+@settled
 def soccer_demos_figure(demos: Demos) -> Figure:
     """Draw the correct demonstrations, and the incorrect ones in the same field (Fig. 11).
 
@@ -286,7 +286,7 @@ def soccer_demos_figure(demos: Demos) -> Figure:
         If the task is not robot soccer.
     """
     field = _field(demos)
-    figure, axes = _figure(1, 2, height=4.05, sharex=True, sharey=True)
+    figure, axes = canvas(1, 2, height=4.05, sharex=True, sharey=True)
     for panel, title in zip(axes, ("(a) correct", "(b) incorrect"), strict=True):
         _draw_field(panel)
         panel.set(title=title, xlabel="x (m)")
@@ -316,7 +316,7 @@ def soccer_demos_figure(demos: Demos) -> Figure:
         handles.append(Line2D([], [], label=f"{kind} ({len(found)})", **line))
     for panel in axes:
         _Movers(panel, obstacles=False).place(correct[0].poses[0], correct[0].balls[0])
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -519,7 +519,7 @@ def animate(
     """
     traces = {title: trace(field, actions[:decisions]) for title, actions in episodes.items()}
     ends = {title: _end(one, len(episodes[title])) for title, one in traces.items()}
-    with _style():
+    with style():
         size = min(WIDTH / len(traces), 4.0)
         figure = Figure(figsize=(WIDTH, size * 0.87 + 0.68), dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
@@ -544,7 +544,7 @@ def animate(
             return []
 
         draw(0)
-        _legend_below(
+        legend_below(
             figure,
             [
                 Line2D([], [], color=BLUE, marker="s", ms=6, lw=0, label="controlled robot"),
@@ -577,7 +577,7 @@ def _end(one: Trace, length: int) -> str:
 
 def save_gif(animation: FuncAnimation, path: Path) -> Path:
     """Write an animation as a GIF, whole or not at all."""
-    with tempfile.TemporaryDirectory() as folder, _style():
+    with tempfile.TemporaryDirectory() as folder, style():
         draft = Path(folder) / "draft.gif"
         animation.save(draft, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=DPI)
         return write_file(path, draft.read_bytes())

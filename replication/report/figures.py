@@ -6,13 +6,9 @@ are derived from the content, so that equal numbers give equal bytes on one plat
 
 from __future__ import annotations
 
-import functools
-import io
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -28,61 +24,22 @@ from numpy.typing import NDArray
 
 from replication.demos.model import Demo, Demos
 from replication.envs.maze import Maze, as_maze
-from replication.files import write_file
 from replication.fit import Fit
+from replication.irl import METHODS
+from replication.report.style import (
+    CORRECT_COLOUR,
+    GOAL_COLOUR,
+    KIND_COLOURS,
+    OBSTACLE_COLOUR,
+    OTHER_KIND_COLOUR,
+    START_COLOUR,
+    WIDTH,
+    canvas,
+    legend_below,
+    settled,
+)
 
-P = ParamSpec("P")
-
-STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 8.5,
-    "axes.titlesize": 9,
-    "axes.labelsize": 8.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.7,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "lines.linewidth": 1.2,
-    "svg.hashsalt": "replication",
-    "svg.fonttype": "path",
-    "savefig.dpi": 200,
-}
-
-# Okabe and Ito's colours, which most colour-blind readers can tell apart.
-COLOURS = {"adaboost": "#7A7A7A", "unified": "#0072B2", "unified-incorrect": "#D55E00"}
-CORRECT_COLOUR = "#D0021B"
-KIND_COLOURS = {"hit": "#0B3C8C", "detour": "#56A3E8"}
-OTHER_KIND_COLOUR = "#009E73"
-OBSTACLE_COLOUR = "#8C8C8C"
-START_COLOUR, GOAL_COLOUR = "#E24A33", "#2CA02C"
-
-WIDTH = 7.0
-"""Inches: both columns of a page."""
-
-ROW = 115
-"""Characters that a row of a legend has room for, 8 of them for each handle."""
-
-
-def _style() -> AbstractContextManager[None]:
-    """Draw in our style, whatever the caller's conditions are."""
-    return mpl.rc_context(mpl.rcParamsDefault | STYLE)
-
-
-def _settled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in our style and settle the layout, else each save would go on from the one before."""
-
-    @functools.wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with _style():
-            figure = draw(*args, **kwargs)
-            figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        return figure
-
-    return wrapper
+COLOURS = {method.name: method.colour for method in METHODS.values()}
 
 
 @dataclass(frozen=True)
@@ -122,22 +79,10 @@ class Counts:
     dashed: bool = False
 
 
-def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "svg")) -> list[Path]:
-    """Write a figure as `path` with each of the suffixes; returns the files."""
-    metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
-    written = []
-    for suffix in formats:
-        buffer = io.BytesIO()
-        with _style():
-            figure.savefig(buffer, format=suffix, metadata=metadata[suffix])
-        written.append(write_file(path.with_suffix(f".{suffix}"), buffer.getvalue()))
-    return written
-
-
-@_settled
+@settled
 def maze_figure(demos: Demos) -> Figure:
     """Draw the map with correct demonstrations, and with incorrect ones too (Figs. 4 and 8)."""
-    figure, axes = _figure(1, 2, height=4.0)
+    figure, axes = canvas(1, 2, height=4.0)
     for panel, title in zip(axes, ("(a) correct", "(b) correct and incorrect"), strict=True):
         _draw_map(panel, as_maze(demos.environment))
         panel.set_title(title)
@@ -154,18 +99,18 @@ def maze_figure(demos: Demos) -> Figure:
         handles.append(
             Line2D([], [], color=_kind_colour(kind), marker=mark, label=f"{kind} ({number})")
         )
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
-@_settled
+@settled
 def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
     """Draw the error against the iteration (Figs. 5 and 9), one panel for each title.
 
     The line is one trial, declared before the run; the band holds the middle half of all trials.
     Triangles on the axis mark where the paper's own curves reach zero.
     """
-    figure, axes = _figure(1, len(panels), height=3.2, sharex=True, sharey=True)
+    figure, axes = canvas(1, len(panels), height=3.2, sharex=True, sharey=True)
     for panel, (title, curves) in zip(axes, panels.items(), strict=True):
         for one in curves:
             iterations = np.arange(one.errors.shape[1])
@@ -202,18 +147,18 @@ def error_figure(panels: Mapping[str, Sequence[Curves]]) -> Figure:
                 [], [], marker="v", ms=6, mfc="white", mec="0.4", lw=0, label="the paper's curve"
             )
         )
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
-@_settled
+@settled
 def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
     """Draw the iterations of every trial (Figs. 6 and 9), one row for each title.
 
     Beside each row stand the distributions, with our mean (dot) and the paper's (open triangle).
     That Fig. 9 shows this, and not errors, is the choice FIG9-AXES.
     """
-    figure, grid = _figure(
+    figure, grid = canvas(
         len(panels), 2, height=0.7 + 2.0 * len(panels), width_ratios=(4, 1), sharey=True
     )
     for (left, right), (title, counts) in zip(np.atleast_2d(grid), panels.items(), strict=True):
@@ -233,11 +178,11 @@ def iterations_figure(panels: Mapping[str, Sequence[Counts]]) -> Figure:
         handles.append(
             Line2D([], [], marker="v", ms=6, mfc="white", mec="0.3", lw=0, label="the paper's mean")
         )
-    _legend_below(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
-@_settled
+@settled
 def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> Figure:
     """Draw values of all states as surfaces over the maze (Fig. 7).
 
@@ -281,7 +226,7 @@ def surfaces_figure(maze: Maze, surfaces: Mapping[str, NDArray[np.float64]]) -> 
     return figure
 
 
-@_settled
+@settled
 def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
     """Draw what each set of incorrect demonstrations saves, a panel for each reading of Eq. 9.
 
@@ -294,7 +239,7 @@ def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
         columns = ["set", "leaving", "saved", "low", "high"]
         panels = {"no incorrect demonstrations": pd.DataFrame(columns=columns)}
     rows = len(next(iter(panels.values())))
-    figure, axes = _figure(1, len(panels), height=1.1 + 0.26 * rows, sharex=True, sharey=True)
+    figure, axes = canvas(1, len(panels), height=1.1 + 0.26 * rows, sharex=True, sharey=True)
     for panel, (title, table) in zip(axes, panels.items(), strict=True):
         y = np.arange(len(table))
         panel.axvline(0, color="0.5", lw=0.8)
@@ -309,11 +254,11 @@ def sets_figure(panels: Mapping[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-@_settled
+@settled
 def fit_figure(fit: Fit) -> Figure:
     """Draw a fit: the map with demonstrations and the learned path, the reward, and the errors."""
     maze = as_maze(fit.demos.environment)
-    figure, axes = _figure(1, 3, height=3.0)
+    figure, axes = canvas(1, 3, height=3.0)
     _draw_map(axes[0], maze)
     for demo in fit.demos.correct:
         _draw_arrows(axes[0], maze, demo)
@@ -329,15 +274,8 @@ def fit_figure(fit: Fit) -> Figure:
     axes[2].set_box_aspect(1)
     demo_handle = Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct demo")
     path_handle = Line2D([], [], color=COLOURS["unified"], lw=4, alpha=0.45, label="learned path")
-    _legend_below(figure, [demo_handle, path_handle])
+    legend_below(figure, [demo_handle, path_handle])
     return figure
-
-
-def _figure(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(n_rows, n_columns, **layout)
-    return figure, np.atleast_1d(axes)
 
 
 def _face_colours(height: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -351,12 +289,6 @@ def _face_colours(height: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _line(one: Curves | Counts) -> dict[str, Any]:
     return {"color": one.colour, "lw": 1.1, "ls": (0, (4, 1.5)) if one.dashed else "-"}
-
-
-def _legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
-    wide = sum(len(str(handle.get_label())) + 8 for handle in handles) > ROW
-    ncols = -(-len(handles) // 2) if wide else len(handles)
-    figure.legend(handles=handles, loc="outside lower center", ncols=ncols)
 
 
 def _places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -1,16 +1,32 @@
-"""What a notebook writes and shows: each figure and table together with its numbers."""
+"""What a notebook writes and shows: each figure and table, together with its numbers.
+
+What is displayed carries in its metadata, under "replication", the name of the files that it is
+also written to, what it is, and the code that drew it. Whoever publishes the notebook or builds a
+page from it goes by that name.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
-from IPython.display import HTML, Image, Markdown
-from matplotlib.figure import Figure
 
-from replication.evidence.tables import markdown, write_csv, write_trials
+from replication.evidence.tables import markdown, read_table, write_csv
 from replication.files import write_file
-from replication.report.figures import save_figure
+from replication.report.picture import Picture
+from replication.report.style import save_figure
+
+
+class Shown:
+    """Something for Jupyter to display, with the metadata of the output."""
+
+    def __init__(self, data: dict[str, Any], **metadata: Any) -> None:
+        self.data = data
+        self.metadata = {"replication": metadata}
+
+    def _repr_mimebundle_(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        return self.data, self.metadata
 
 
 class Outputs:
@@ -26,47 +42,27 @@ class Outputs:
         self.folder = folder
         self.folder.mkdir(parents=True, exist_ok=True)
 
-    def figure(self, figure: Figure, name: str, *, numbers: pd.DataFrame, alt: str) -> Image:
-        """Write a figure as PNG and SVG, and its plotted numbers as CSV; return it for display.
+    def figure(self, picture: Picture, name: str) -> Shown:
+        """Write `name`.csv, and draw it into `name`.png and `name`.svg; return it for display."""
+        numbers = read_table(write_csv(picture.numbers, self.folder / f"{name}.csv"))
+        png, _ = save_figure(picture.draw(numbers), self.folder / name, ("png", "svg"))
+        data = {"image/png": png.read_bytes(), "text/plain": picture.words}
+        return Shown(data, kind="figure", name=name, alt=picture.words, code=picture.code)
 
-        Parameters
-        ----------
-        figure
-            From :mod:`replication.report.figures`.
-        name
-            File name without a suffix.
-        numbers
-            What is plotted.
-        alt
-            What the figure shows, in words, for those who cannot see it.
-        """
-        write_csv(numbers, self.folder / f"{name}.csv")
-        png, _ = save_figure(figure, self.folder / name, ("png", "svg"))
-        return Image(data=png.read_bytes(), width=700, alt=alt)
-
-    def player(self, player: str, name: str, *, numbers: pd.DataFrame) -> HTML:
-        """Write a moving figure as HTML, and its numbers as CSV; return it for display.
-
-        Parameters
-        ----------
-        player
-            From :mod:`replication.report.players`.
-        name
-            File name without a suffix.
-        numbers
-            What moves.
-        """
-        write_csv(numbers, self.folder / f"{name}.csv")
-        write_file(self.folder / f"{name}.html", player)
-        return HTML(player)
-
-    def table(self, table: pd.DataFrame, name: str, *, readable: pd.DataFrame) -> Markdown:
-        """Write a table in full as CSV and for reading as Markdown; return the latter."""
+    def table(self, table: pd.DataFrame, name: str, *, readable: pd.DataFrame) -> Shown:
+        """Write a table in full as `name`.csv and for reading as `name`.md; show the latter."""
         text = markdown(readable)
         write_csv(table, self.folder / f"{name}.csv")
         write_file(self.folder / f"{name}.md", text)
-        return Markdown(text)
+        return Shown({"text/markdown": text, "text/plain": text}, kind="table", name=name)
 
-    def trials(self, trials: pd.DataFrame) -> None:
-        """Write tidy trials to `trials.csv`, beside those of other tasks."""
-        write_trials(trials, self.folder / "trials.csv")
+    def player(self, player: str, name: str, *, numbers: pd.DataFrame, words: str) -> Shown:
+        """Write a moving figure as `name`.html, and its numbers as `name`.csv; show it."""
+        write_csv(numbers, self.folder / f"{name}.csv")
+        write_file(self.folder / f"{name}.html", player)
+        data = {"text/html": player, "text/plain": words}
+        return Shown(data, kind="player", name=name, alt=words)
+
+    def data(self, table: pd.DataFrame, name: str) -> None:
+        """Write a table that is not shown as `name`.csv."""
+        write_csv(table, self.folder / f"{name}.csv")

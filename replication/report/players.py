@@ -36,7 +36,8 @@ from replication.envs.soccer.field import SoccerField
 from replication.evidence.experiments import F_LABELS, Key
 from replication.irl import Trial, get_method
 from replication.report.field_figures import _draw_field, trace
-from replication.report.figures import COLOURS, _draw_map, _legend_below, _places, _style
+from replication.report.figures import COLOURS, _draw_map, _places
+from replication.report.style import legend_below, style
 
 Floats = NDArray[np.float64]
 
@@ -138,7 +139,7 @@ def learning_player(demos: Demos, shown: Sequence[Course]) -> str:
     A method that has converged keeps its last frame until all have. Of very many iterations some
     are left out, evenly.
     """
-    with _style():
+    with style():
         figure = Figure(figsize=(2.75 * len(shown) + 0.5, 4.35), dpi=DPI, layout="constrained")
         _Canvas(figure)
         grid = figure.subplots(2, len(shown), height_ratios=(3, 1), squeeze=False)
@@ -157,7 +158,7 @@ def learning_player(demos: Demos, shown: Sequence[Course]) -> str:
         )
         bar.set_ticks([-most, 0, most], labels=["avoid", "0", "seek"])
         bar.set_label("reward weight (√ of its size)", labelpad=-2)
-        _legend_below(
+        legend_below(
             figure,
             [
                 Line2D([], [], color="0.1", label="the agent's way", lw=1.6),
@@ -301,7 +302,7 @@ def player(animation: FuncAnimation, description: str, *, frames_a_second: int) 
     frames_a_second
         How fast it plays at first.
     """
-    with _style(), mpl.rc_context({"savefig.dpi": DPI}):
+    with style(), mpl.rc_context({"savefig.dpi": DPI}):
         text = animation.to_jshtml(fps=frames_a_second, default_mode="once")
     text = re.sub(r"<link[^>]*>\s*", "", text)
     text = re.sub(r'<i class="fa ([^"]*)"></i>', lambda match: _ICONS[match[1]], text)

@@ -33,7 +33,7 @@ from replication.report.claim_figures import (
     shares_figure,
     single_figure,
 )
-from replication.report.figures import save_figure
+from replication.report.style import save_figure
 
 MAZES = load_specifications().mazes
 FACTORIAL = factorial_specifications(MAZES.factorial)

@@ -28,7 +28,7 @@ from replication.report.field_figures import (
     soccer_demos_figure,
     trace,
 )
-from replication.report.figures import save_figure
+from replication.report.style import save_figure
 
 FIELD = SoccerField()
 CUT = 6

@@ -17,10 +17,10 @@ from replication.report.figures import (
     fit_figure,
     iterations_figure,
     maze_figure,
-    save_figure,
     sets_figure,
     surfaces_figure,
 )
+from replication.report.style import save_figure
 
 CURVES = [
     Curves(
