@@ -21,14 +21,8 @@ from replication.envs.soccer.rules import SoccerParams
 Array = NDArray[np.float64]
 
 _SMALL_MAP = ("....G", ".##..", ".....", "..##.", "S....")
-
-
 _CELL = 8  # side of a cell in an RGB image
-
-
 _COLOURS = {".": (255, 255, 255), "#": (64, 64, 64), "S": (158, 202, 225), "G": (161, 217, 155)}
-
-
 _AGENT_COLOUR = (214, 39, 40)
 
 
@@ -57,6 +51,7 @@ class MazeEnv(gymnasium.Env[Any, Any]):
 
     Examples
     --------
+    >>> from replication.envs.maze import ACTIONS
     >>> env = gymnasium.make("replication/Maze-v0", maze=["S.G"])
     >>> env.reset(seed=1)
     (0, {})
@@ -134,8 +129,8 @@ _ROBOT, _OBSTACLE, _FRONT = (40, 80, 200), (235, 200, 30), (214, 39, 40)
 class SoccerEnv(gymnasium.Env[Any, Any]):
     """Robot soccer as a Gymnasium environment, registered as ``replication/Soccer-v0``.
 
-    Observations are states, actions the numbers of `replication.envs.soccer.rules.ACTIONS`. An episode
-    terminates with a goal and is truncated when the simulated time is up. There is no chance in it.
+    Observations are states, actions the numbers of `rules.ACTIONS`. An episode terminates with a
+    goal and is truncated when the simulated time is up. The world is deterministic.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ VALUES = st.recursive(
         ),
         (
             b"{\n \"format\": 'x'}",
-            "is not JSON: Expecting value at line 2, column 12; mend it there",
+            "is not JSON: Expecting value at line 2, column 12; fix it there",
         ),
         (b"{} {}", "is not JSON: Extra data at line 1, column 4"),
         ("{}".encode("utf-16"), "is not UTF-8 text (byte 1); save it as UTF-8"),

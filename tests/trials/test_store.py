@@ -27,8 +27,8 @@ CHILD = """
 import os, sys
 import numpy as np
 from replication.irl import Trial
-from replication.store import Store
-from replication.tasks import Episode
+from replication.irl.agent import Episode
+from replication.trials.store import Store
 
 def batch(b, value):
     table, few = np.full((100, 4), float(value)), np.arange(2)

@@ -77,6 +77,7 @@ class SoccerWorld:
 
     Examples
     --------
+    >>> from replication.envs.soccer.rules import FORWARD, decode
     >>> world = SoccerWorld()
     >>> decode(world.reset())
     (1, 2, False)
