@@ -118,7 +118,8 @@ class Demos:
                 end = compact(self.environment.cell(int(demo.states[-1])))
                 raise DemoError(
                     f"demo {show(demo.name)} is correct, but ends at {end} and misses "
-                    f"{goal_phrase(self.environment)}; add the missing steps or move it to 'incorrect'"
+                    f"{goal_phrase(self.environment)}; add the missing steps or move it to "
+                    "'incorrect'"
                 )
         for demo in self.incorrect:
             if not re.fullmatch(KIND, demo.kind) or demo.kind in RESERVED_KINDS:

@@ -35,7 +35,7 @@ def test_replay() -> None:
 @pytest.mark.parametrize(
     ("step", "claim", "message"),
     [
-        (0, [1, 0], r"demo 'c' begins at \[1,0\], but the start is \[0,0\]; write \[0,0\]$"),
+        (0, [1, 0], r"demo 'c' starts at \[1,0\], but the start is \[0,0\]; write \[0,0\]$"),
         (1, [1, 0], r"step 1 of demo 'c': 'right' from \[0,0\] leads to \[0,1\], but the file cl"),
         (3, [9, 9], r"step 3 .* leads to \[1,2\], but the file claims \[9,9\]; write \[1,2\] or"),
     ],
@@ -67,7 +67,7 @@ def test_wrong_number_of_claims() -> None:
         ([4], [0, 0], r"demo 'c': actions must be 0\.\.3"),
         ([-1], [0, 0], r"demo 'c': actions must be 0\.\.3"),
         ([2], [0, 99], r"leads to \[0,1\], but the file claims \[33,0\]"),
-        ([2, 1, 2, 3], [0, 1, 4, 5, 4], "goes on after reaching the goal at step 3; drop the 1 st"),
+        ([2, 1, 2, 3], [0, 1, 4, 5, 4], "goes on after reaching the goal at step 3; drop the st"),
     ],
 )
 def test_wrong_moves(actions: list[int], states: list[int], message: str) -> None:

@@ -167,7 +167,7 @@ def test_two_actions_in_one_state_are_a_warning(write: Callable[[Any], Path]) ->
         demos = load_demos(path)
     assert demos.conflicts() == (0,)
     assert [str(warning.message) for warning in caught] == check_demos(path)
-    assert "ask for 'up' and 'right' in [0,0]" in str(caught[0].message)
+    assert "take 'up' and 'right' in [0,0]" in str(caught[0].message)
     assert Path(caught[0].filename) == Path(__file__)
 
 
@@ -316,7 +316,7 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
     ),
     "begins elsewhere": (
         [(("correct", 0, "states", 0), [1, 0])],
-        "demo 'c' begins at [1,0], but the start is [0,0]; write [0,0]",
+        "demo 'c' starts at [1,0], but the start is [0,0]; write [0,0]",
     ),
     "a state too few": (
         [(("correct", 0, "states", 3), ...)],
@@ -333,7 +333,7 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
     ),
     "goes on": (
         [(("correct", 0, "actions", 3), "up"), (("correct", 0, "states"), ...)],
-        "demo 'c' goes on after reaching the goal at step 3; drop the 1 steps that follow",
+        "demo 'c' goes on after reaching the goal at step 3; drop the steps that follow",
     ),
     "incorrect goes on": (
         [(("incorrect", 1, "actions", 3), "left"), (("incorrect", 1, "states"), ...)],

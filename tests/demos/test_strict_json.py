@@ -44,7 +44,7 @@ VALUES = st.recursive(
         (b"{} {}", "is not JSON: Extra data at line 1, column 4"),
         ("{}".encode("utf-16"), "is not UTF-8 text (byte 1); save it as UTF-8"),
         (b'{"a": "\xff"}', "is not UTF-8 text (byte 8)"),
-        (b'{"a": 1, "b": {"c": 1, "c": 2}}', "the field 'c' stands twice in one object; keep one"),
+        (b'{"a": 1, "b": {"c": 1, "c": 2}}', "the field 'c' appears twice in one object; keep one"),
         (b'{"a": NaN}', "NaN is not a JSON number; write a finite number"),
         (b"[-Infinity]", "-Infinity is not a JSON number"),
         (b'{"a": 1e999}', "the number 1e999 is too large"),
