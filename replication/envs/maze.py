@@ -84,7 +84,7 @@ class Maze:
 
     @classmethod
     def from_text(cls, text: str) -> Maze:
-        """Read a maze from text, one row per line; blank margins are ignored."""
+        """Read a maze from text, a row per line; margins are ignored."""
         return cls(tuple(line.strip() for line in text.strip().splitlines()))
 
     @property
@@ -109,7 +109,7 @@ class Maze:
 
     @property
     def actions(self) -> tuple[str, ...]:
-        """Names of the actions."""
+        """Names of actions."""
         return ACTIONS
 
     @cached_property
@@ -191,7 +191,7 @@ class Maze:
         return int(at_goal[0]) if at_goal.size else None
 
     def describe(self) -> dict[str, Any]:
-        """Return the maze as plain JSON values."""
+        """Return plain JSON values."""
         return {
             "kind": self.kind,
             "map": list(self.rows),
