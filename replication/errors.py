@@ -1,4 +1,4 @@
-"""What a user is told when something is wrong: one line that says where and how to fix it."""
+"""The base of all errors that users see, and the words of their messages."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 
 class UserError(ValueError):
-    """A mistake in what the package was given; the message is one line for the user."""
+    """A mistake in what the user gave; the message says in one line where, and how to fix it."""
 
 
 def unknown(name: str, known: Iterable[str], what: str) -> str:
-    """Return the message about a misspelt `name`, with the nearest of the `known` ones first.
+    """Return the message about an unknown `name`, with the most similar of the `known` ones first.
 
     Examples
     --------
@@ -27,18 +27,18 @@ def unknown(name: str, known: Iterable[str], what: str) -> str:
 
 
 def compact(value: Any) -> str:
-    """JSON text without blanks."""
+    """Return JSON text without blanks."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
 
 
 def suggest(word: str, known: Sequence[str]) -> str:
-    """Ask whether a similar word was meant, if there is one."""
+    """Ask whether a similar known word was meant; empty if there is none."""
     close = difflib.get_close_matches(word[:40], known, n=1)
     return f"did you mean {close[0]!r}? " if close else ""
 
 
 def show(value: Any) -> str:
-    r"""Name any JSON value in a few words.
+    r"""Describe any JSON value in a few words.
 
     Examples
     --------
@@ -56,5 +56,5 @@ def show(value: Any) -> str:
 
 
 def clip(text: str, length: int = 60) -> str:
-    """Cut a long text."""
+    """Shorten a text to a length."""
     return text if len(text) <= length else f"{text[: length - 3]}..."

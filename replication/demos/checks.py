@@ -1,4 +1,4 @@
-"""What a demonstration has to be; an error is one line that says where it is wrong and how to fix it.
+"""What makes a demonstration valid; an error says in one line where it is wrong and how to fix it.
 
 A demonstration is checked by replaying its actions from the start. Cells count from 0.
 Steps count from 1: step k takes ``actions[k - 1]`` and leads to ``states[k]``.
@@ -56,16 +56,16 @@ def replay(
     states = environment.replay(actions)
     cells = environment.cells(states).tolist()
     claims = cells if claims is None else claims
-    for step, (due, claim) in enumerate(zip(cells, claims, strict=False)):
-        if claim == due:
+    for step, (cell, claim) in enumerate(zip(cells, claims, strict=False)):
+        if claim == cell:
             continue
-        right, claimed = compact(due), compact(claim)
+        right, claimed = compact(cell), compact(claim)
         if step == 0:
             raise DemoError(
-                f"demo {show(name)} begins at {claimed}, but the start is {right}; write {right}"
+                f"demo {show(name)} starts at {claimed}, but the start is {right}; write {right}"
             )
         action, before = environment.actions[actions[step - 1]], cells[step - 1]
-        outcome = no_op_phrase(environment) if due == before else f"leads to {right}"
+        outcome = no_op_phrase(environment) if cell == before else f"leads to {right}"
         raise DemoError(
             f"step {step} of demo {show(name)}: {action!r} from {compact(before)} {outcome}, but "
             f"the file claims {claimed}; write {right} or change the action"
@@ -73,7 +73,7 @@ def replay(
     if len(cells) != len(claims):
         raise DemoError(
             f"demo {show(name)} has {len(actions)} actions and {len(claims)} states; give "
-            f"{len(cells)} states, the last one reached included, or leave 'states' out"
+            f"{len(cells)} states, the last one reached included, or leave out 'states'"
         )
     return states
 
@@ -81,7 +81,7 @@ def replay(
 def check_moves(
     environment: Environment, name: str, actions: NDArray[np.int64], states: NDArray[np.int64]
 ) -> None:
-    """Refuse a demonstration that is empty, leaves the moves, or goes on beyond the goal.
+    """Refuse a demonstration that is empty, breaks the rules of moving, or goes on after the goal.
 
     Raises
     ------
@@ -97,12 +97,12 @@ def check_moves(
     if end is not None and end < actions.size:
         raise DemoError(
             f"demo {show(name)} goes on after reaching the goal at step {end}; "
-            f"drop the {actions.size - end} steps that follow"
+            "drop the steps that follow"
         )
 
 
 def goal_phrase(environment: Environment) -> str:
-    """Return the goal of an environment in words."""
+    """Name the goal of an environment."""
     if environment.kind == "soccer":
         return "the gate, as no goal falls"
     goal = getattr(environment, "goal", None)
@@ -110,7 +110,7 @@ def goal_phrase(environment: Environment) -> str:
 
 
 def no_op_phrase(environment: Environment) -> str:
-    """Return in words what it means that a move leaves the state as it was."""
+    """Describe a move that leaves the state as it was."""
     return {"maze": "hits a wall and stays", "soccer": "stays in its cell"}.get(
         environment.kind, "changes nothing"
     )

@@ -28,8 +28,8 @@ def load_demos(path: str | os.PathLike[str]) -> Demos:
     Warns
     -----
     DemoWarning
-        If no deterministic policy can match the correct demos exactly, or if an incorrect demo
-        has no effect.
+        If no deterministic policy can match the correct demos exactly, or if an incorrect demo has
+        no effect.
     """
     demos = _read(path)
     for warning in _warnings(demos):
@@ -84,12 +84,12 @@ def demos_document(demos: Demos) -> dict[str, Any]:
 
 
 def save_demos(demos: Demos, path: str | os.PathLike[str]) -> None:
-    """Write a demonstration file in the one stable layout; an old file is replaced at once.
+    """Write a demonstration file, always in the same layout; an old file is replaced atomically.
 
     Raises
     ------
     DemoError
-        If the file could not be read back (its text is too long, for instance) or not be written.
+        If the file could not be read back (a name is too long, for instance) or cannot be written.
     """
     with _naming(path):
         try:
@@ -109,31 +109,31 @@ def _demo(environment: Environment, kind: str, fields: CorrectFields | Incorrect
 
 
 def _warnings(demos: Demos) -> list[str]:
-    """Return what cannot be learned from demonstrations that are otherwise usable."""
-    found = []
+    """Return why usable demonstrations may not be learned exactly, or may have no effect."""
+    messages = []
     conflicts = demos.conflicts()
     if conflicts:
         state = conflicts[0]
-        asked = sorted({a for d in demos.correct for a in d.actions[d.states[:-1] == state]})
-        actions = " and ".join(repr(demos.environment.actions[action]) for action in asked)
-        found.append(
-            f"the correct demos ask for {actions} in {compact(demos.environment.cell(state))}"
+        taken = sorted({a for d in demos.correct for a in d.actions[d.states[:-1] == state]})
+        actions = " and ".join(repr(demos.environment.actions[action]) for action in taken)
+        messages.append(
+            f"the correct demos take {actions} in {compact(demos.environment.cell(state))}"
             f" (one of {len(conflicts)} such states): d = 0 cannot be reached"
         )
     paths = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
     if len(paths) > 1:
-        found.append(
+        messages.append(
             f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
             "which a single deterministic trajectory cannot match"
         )
     right = state_action_pairs(*demos.correct)
-    found += [
-        f"incorrect demo {show(demo.name)} has no effect: each of its pairs of a state and an "
-        "action is a correct demo's, too"
+    messages += [
+        f"incorrect demo {show(demo.name)} has no effect: all its pairs of state and action "
+        "occur in a correct demo, too"
         for demo in demos.incorrect
         if state_action_pairs(demo) <= right
     ]
-    return found
+    return messages
 
 
 def _read(path: str | os.PathLike[str]) -> Demos:
@@ -143,7 +143,7 @@ def _read(path: str | os.PathLike[str]) -> Demos:
 
 @contextmanager
 def _naming(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the file's name before what is refused."""
+    """Put the file's name in front of a refusal."""
     try:
         yield
     except DemoError as error:

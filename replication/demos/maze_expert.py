@@ -1,7 +1,7 @@
-"""The scripted expert: the rules that made the stored demonstrations of the mazes.
+"""The scripted expert in mazes: the rules behind the stored demonstrations.
 
-The paper shows its demonstrations only as pictures, so ours follow from rules, the same for every
-maze. The expert always drives whole trajectories from the start:
+The paper shows its demonstrations only as pictures, so ours follow rules, the same for every maze.
+Each demonstration is a whole trajectory from the start:
 
 ``correct``
     Among the shortest paths the one whose straight legs are nearest to a given length (choice
@@ -10,13 +10,13 @@ maze. The expert always drives whole trajectories from the start:
     Misses a turn: at a corner of the correct path it drives straight on until it bumps.
 ``detour``, ``near-detour``, ``far-detour``
     Takes a turn too wide: leaves the correct path in the middle of the leg before a corner, passes
-    a point outside the corner, and joins the path again in the middle of the leg after it. How far
-    outside is the choice DETOUR-WIDTH; a near one keeps 1 cell off, a far one as far as the walls
-    allow. Where the point cannot be passed without turning back, the detour is narrower.
+    a point outside the corner, and rejoins the path in the middle of the leg after it. The choice
+    DETOUR-WIDTH says how far outside; a near detour passes 1 cell off, a far one as far off as the
+    walls allow. Where the point cannot be passed without turning back, the detour is narrower.
 ``opposite``
     Turns round just before the goal and drives the correct path back to the start.
 
-There is one demonstration of a kind at each corner where the rule can be carried out (choice
+There is one demonstration of each kind at each corner where the rule can be carried out (choice
 INCORRECT-NUMBER).
 """
 
@@ -146,33 +146,28 @@ def incorrect_demos(maze: Maze, correct: list[int], *, params: Expert) -> Iterat
         "near-detour": 1,
         "far-detour": max(maze.shape),
     }
-    found: dict[str, list[list[int] | None]] = {}
-    found["hit"] = [_miss(maze, correct, corner) for corner in corners]
-    for kind, width in widths.items():
-        found[kind] = [_detour(maze, correct, corner, width) for corner in corners]
     back = [OPPOSITE[action] for action in reversed(correct[:-1])]
-    found["opposite"] = [correct[:-1] + back]
-    for kind, drives in found.items():
-        for number, actions in enumerate(filter(None, drives), start=1):
+    drives: dict[str, list[list[int] | None]] = {
+        "hit": [_miss(maze, correct, corner) for corner in corners],
+        **{
+            kind: [_detour(maze, correct, corner, width) for corner in corners]
+            for kind, width in widths.items()
+        },
+        "opposite": [correct[:-1] + back],
+    }
+    for kind, attempts in drives.items():
+        for number, actions in enumerate(filter(None, attempts), start=1):
             yield _drive(maze, actions, f"{kind}-{number}", kind)
 
 
 def _drive(maze: Maze, actions: list[int], name: str, kind: str) -> Demo:
-    states = _states(maze, actions)
-    return Demo(name=name, kind=kind, states=states, actions=np.array(actions))
-
-
-def _states(maze: Maze, actions: list[int]) -> np.ndarray:
-    states = [maze.start]
-    for action in actions:
-        states.append(int(maze.next_state[states[-1], action]))
-    return np.array(states)
+    return Demo(name=name, kind=kind, states=maze.replay(actions), actions=np.array(actions))
 
 
 def _miss(maze: Maze, correct: list[int], corner: int) -> list[int]:
     """Drive straight on at the corner until a move changes nothing."""
     actions = correct[:corner]
-    state = int(_states(maze, actions)[-1])
+    state = int(maze.replay(actions)[-1])
     while True:
         actions = [*actions, correct[corner - 1]]
         there = int(maze.next_state[state, actions[-1]])
@@ -187,7 +182,7 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
     at = turns.index(corner)
     leave = (turns[at - 1] + corner) // 2
     join = (corner + turns[at + 1] + 1) // 2
-    path = _states(maze, correct)
+    path = maze.replay(correct)
     row, column = maze.cell(int(path[corner]))
     ahead, back = correct[corner - 1], OPPOSITE[correct[corner]]
     for reach in range(width, 0, -1):

@@ -1,6 +1,6 @@
-"""Demonstrations as objects, checked when they are made.
+"""Demonstrations as objects that are checked when they are made.
 
-:mod:`replication.demos.files` reads and writes them, :mod:`replication.demos.checks` checks moves.
+:mod:`replication.demos.files` reads and writes them, :mod:`replication.demos.checks` checks them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Demo:
     kind
         "correct", or the kind of mistake, such as "hit" or "detour".
     states
-        Visited states, int64 [T + 1], with the state that is reached last; read-only.
+        Visited states, int64 [T + 1], the one reached last included; read-only.
     actions
         Actions taken, int64 [T]; read-only.
     """
@@ -68,26 +68,26 @@ class Demo:
 
 @dataclass(frozen=True)
 class Demos:
-    """A task's demonstrations, validated when they are made.
+    """All demonstrations of a task, validated when they are made.
 
     Parameters
     ----------
     task
         Short name of the task: letters, digits, ``-`` and ``_``.
     environment
-        The world that the demonstrations were made in.
+        The world in which the demonstrations were made.
     correct
         At least one trajectory from the start to the goal.
     incorrect
-        Trajectories from the start that show mistakes, each of some kind.
+        Trajectories from the start that show mistakes, each of a named kind.
     description
         Free text.
 
     Raises
     ------
     DemoError
-        If a demonstration does not follow the environment's moves, is empty, goes on beyond the
-        goal or (a correct one) misses it, or if names or kinds are not usable.
+        If a demonstration is empty, breaks the rules of moving, goes on after the goal or (a
+        correct one) misses it, or if a name or kind is not allowed.
     """
 
     task: str
@@ -118,7 +118,8 @@ class Demos:
                 end = compact(self.environment.cell(int(demo.states[-1])))
                 raise DemoError(
                     f"demo {show(demo.name)} is correct, but ends at {end} and misses "
-                    f"{goal_phrase(self.environment)}; add the missing steps or move it to 'incorrect'"
+                    f"{goal_phrase(self.environment)}; add the missing steps or move it to "
+                    "'incorrect'"
                 )
         for demo in self.incorrect:
             if not re.fullmatch(KIND, demo.kind) or demo.kind in RESERVED_KINDS:
@@ -129,11 +130,11 @@ class Demos:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of the incorrect demos, each once, in the order of the file."""
+        """Kinds of the incorrect demos, each once, in order of appearance."""
         return tuple(dict.fromkeys(demo.kind for demo in self.incorrect))
 
     def select(self, kinds: str) -> Demos:
-        """Keep the incorrect demos of some kinds only, and all correct ones.
+        """Return the correct demos and only some kinds of the incorrect ones.
 
         Parameters
         ----------
@@ -143,7 +144,7 @@ class Demos:
         Raises
         ------
         DemoError
-            If there is no incorrect demo of a kind that is asked for.
+            If there is no incorrect demo of a requested kind.
         """
         if kinds == "all":
             return self
@@ -157,16 +158,16 @@ class Demos:
         return replace(self, incorrect=tuple(d for d in self.incorrect if d.kind in wanted))
 
     def conflicts(self) -> tuple[int, ...]:
-        """States in which the correct demos, taken together, ask for more than one action."""
+        """States in which the correct demos, taken together, show more than one action."""
         states = sorted(state for state, _ in state_action_pairs(*self.correct))
         return tuple(sorted({a for a, b in pairwise(states) if a == b}))
 
 
 def content_hash(demos: Demos) -> str:
-    """SHA-256, as hexadecimal text, of what a learner sees.
+    """Return the SHA-256, as hexadecimal text, of what a learner sees.
 
-    That is the environment and, in order, each demo's kind, states and actions; names,
-    description and the file's layout do not matter.
+    That is the environment and, in order, each demo's kind, states and actions; names, description
+    and layout of the file do not count.
     """
     seen = {
         "environment": demos.environment.describe(),
@@ -180,7 +181,7 @@ def content_hash(demos: Demos) -> str:
 
 
 def state_action_pairs(*demos: Demo) -> set[tuple[int, int]]:
-    """All pairs of a state and the action taken there."""
+    """Return all pairs of a state and the action taken there."""
     return {
         pair
         for demo in demos

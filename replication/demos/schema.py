@@ -18,9 +18,9 @@ A file looks like this (``data/demos/schema.json`` has the full structure):
       ]
     }
 
-What follows from the rest may be left out: ``states``, the ``actions``, ``start`` and ``goal`` of
-the environment, ``description`` and ``incorrect``. What is given is checked: its structure here,
-the moves in :mod:`replication.demos.checks`.
+What can be derived from the rest may be left out: ``states``, the environment's ``actions``,
+``start`` and ``goal``, ``description`` and ``incorrect``. What is given is checked: its structure
+here, the moves in :mod:`replication.demos.checks`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ VERSION = 1
 
 # --- what a file holds -----------------------------------------------------------------------
 
-# A kind of environment is a class of fields here, told apart by `kind`, that can `build` the
+# Each kind of environment has a class of fields here, with its own `kind`, that can `build` the
 # environment; the environment can `describe` itself.
 
 
@@ -79,11 +79,11 @@ class MazeFields(_Fields):
             raise DemoError(f"environment: {error}") from None
         derived = maze.describe()
         for field in ("actions", "start", "goal"):
-            given, due = getattr(self, field), derived[field]
-            if given is not None and given != due:
+            given, drawn = getattr(self, field), derived[field]
+            if given is not None and given != drawn:
                 raise DemoError(
-                    f"environment: {field!r} is {show(given)}, but by the map it is "
-                    f"{compact(due)}; write that, or leave it out"
+                    f"environment: {field!r} is {show(given)}, but should be "
+                    f"{compact(drawn)}; write that or leave it out"
                 )
         return maze
 
@@ -113,8 +113,8 @@ class SoccerFields(_Fields):
             raise DemoError(f"environment: {error}") from None
         if self.actions is not None and tuple(self.actions) != field.actions:
             raise DemoError(
-                f"environment: 'actions' is {show(self.actions)}, but soccer has "
-                f"{compact(field.actions)}; write that, or leave it out"
+                f"environment: 'actions' is {show(self.actions)}, but should be "
+                f"{compact(field.actions)}; write that or leave it out"
             )
         return field
 
@@ -153,7 +153,7 @@ class DemoFile(_Fields):
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON schema of the file's structure (that the moves are right cannot be said in a schema)."""
+    """JSON schema of the file's structure (no schema can state that the moves are right)."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | (
         DemoFile.model_json_schema()
     )
@@ -170,12 +170,12 @@ def read_fields(content: bytes) -> DemoFile:
     data = read_json(content)
     if not isinstance(data, dict):
         raise DemoError(f"holds {show(data)}; a demonstration file is one JSON object")
-    for field, due in (("format", FORMAT), ("version", VERSION)):
+    for field, expected in (("format", FORMAT), ("version", VERSION)):
         if field not in data:
-            raise DemoError(f'{field!r} is missing; write "{field}": {compact(due)}')
-        if type(data[field]) is not type(due) or data[field] != due:
+            raise DemoError(f'{field!r} is missing; write "{field}": {compact(expected)}')
+        if type(data[field]) is not type(expected) or data[field] != expected:
             raise DemoError(
-                f"unknown {field} {show(data[field])}; this program reads {compact(due)}"
+                f"unknown {field} {show(data[field])}; this program reads {compact(expected)}"
             )
     try:
         return DemoFile.model_validate(data)
@@ -191,7 +191,7 @@ _MODELS: dict[str, type[BaseModel]] = {
 
 
 def _explain(error: ValidationError, data: dict[str, Any]) -> str:
-    """One line for the first thing that pydantic found."""
+    """Explain the first error that pydantic reports, in one line."""
     first = error.errors(include_url=False)[0]
     place, kind = first["loc"], first["type"]
     models = dict(_MODELS)
@@ -217,8 +217,8 @@ def _explain(error: ValidationError, data: dict[str, Any]) -> str:
             f"the fields are {', '.join(known)}"
         )
     message = first["msg"][:1].lower() + first["msg"][1:]
-    mend = FIXES.get(first.get("ctx", {}).get("pattern", ""), message)
-    return f"{_where(place, data)}{show(first['input'])} does not fit: {mend}"
+    fix = FIXES.get(first.get("ctx", {}).get("pattern", ""), message)
+    return f"{_where(place, data)}{show(first['input'])} does not fit: {fix}"
 
 
 def _where(place: tuple[int | str, ...], data: Any) -> str:

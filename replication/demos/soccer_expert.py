@@ -1,19 +1,19 @@
-"""The scripted expert in robot soccer: the rules that made the stored demonstrations.
+"""The scripted expert in robot soccer: the rules behind the stored demonstrations.
 
 ``correct``
-    Drives to the ball, more slowly while an obstacle is detected, and kicks it into the gate: a
-    function of the discretised state, else d = 0 could not be reached.
+    Drives to the ball, more slowly while an obstacle is detected, and kicks it into the goal. Its
+    action is a function of the discretised state, or else d = 0 could not be reached.
 
 The expert shows the paper's four kinds of mistakes. It leaves the correct path at its start and
-wherever its action changes, or else at every decision (choice SOCCER-INCORRECT), and there
+wherever its action changes, or at every decision (choice SOCCER-INCORRECT), and then
 
 ``hit``
     drives on to the right, or to the left, until it touches an obstacle or a wall;
 ``detour``
     goes to the right, or to the left, for four decisions, or fewer if it would touch something,
-    and from there to the ball as ever (the number is that of DETOUR-WIDTH);
+    and from there to the ball as usual (the number is that of DETOUR-WIDTH);
 ``overspeed``
-    does not slow down any more, up to a contact or the goal;
+    never slows down again, until a contact or the goal;
 ``opposite``
     drives away from the ball, for as many decisions as it has driven, but at least four.
 
@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.field import SoccerField
@@ -42,7 +43,7 @@ class SoccerExpert(Chosen):
 
 
 LONGEST = 100
-"""Decisions after which the expert gives a drive up."""
+"""Number of decisions after which the expert gives up a drive."""
 
 
 def demonstrate_soccer(
@@ -52,10 +53,17 @@ def demonstrate_soccer(
     params: SoccerExpert | None = None,
     description: str = "",
 ) -> Demos:
-    """Return the demonstrations of all kinds on a field."""
+    """Return the demonstrations of all kinds on a field.
+
+    Raises
+    ------
+    DemoError
+        If the expert does not score there.
+    """
     field = field or SoccerField()
     correct = _drive(field, [], lambda world, state: expert_action(state))
-    assert correct is not None, "the expert does not score on this field"
+    if correct is None:
+        raise DemoError("the expert does not score on this field; change the world's parameters")
     return Demos(
         task=task,
         environment=field,
@@ -80,9 +88,9 @@ def incorrect_demos(
         "opposite": [_opposite(field, correct[:t]) for t in leave],
     }
     seen = {tuple(correct)}
-    for kind, found in drives.items():
+    for kind, attempts in drives.items():
         number = 0
-        for actions in found:
+        for actions in attempts:
             if actions is not None and tuple(actions) not in seen:
                 seen.add(tuple(actions))
                 number += 1
@@ -122,7 +130,7 @@ def _drive(
     *,
     end_at_contact: bool = False,
 ) -> list[int] | None:
-    """Take actions and go on with a policy to the goal, or to a contact; None if neither."""
+    """Take actions, then follow a policy to the goal or a contact; None if it reaches neither."""
     world = FastSoccerWorld(field.params)
     state, actions = world.reset(), list[int]()
     while len(actions) < LONGEST:

@@ -1,4 +1,4 @@
-"""The JSON of demonstration files: read strictly, written in one stable layout."""
+"""JSON for demonstration files: read strictly, written in a fixed layout."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def read_content(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     DemoError
-        If there is none.
+        If it is missing, not a regular file, too large or unreadable.
     """
     try:
         info = Path(path).stat()
@@ -39,7 +39,7 @@ def read_content(path: str | os.PathLike[str]) -> bytes:
 
 
 def read_json(content: bytes) -> Any:
-    """Read JSON text, without what JSON or its readers leave open.
+    """Read JSON text strictly, without the extensions of Python's reader.
 
     Raises
     ------
@@ -67,11 +67,11 @@ def read_json(content: bytes) -> Any:
             f"is not JSON: {error.msg} at line {error.lineno}, column {error.colno}; fix it there"
         ) from None
     except RecursionError:
-        raise DemoError("is nested too deeply; a demonstration file needs five levels") from None
+        raise DemoError("is nested too deeply; a demonstration file has five levels") from None
 
 
 def layout(value: Any, *, rows: bool = False, indent: str = "\n") -> str:
-    """JSON text: an object's fields and a map's rows have lines of their own, other lists one."""
+    """Return JSON text: a line for each field and each row of a map, one line for other lists."""
     inner = indent + "  "
     if isinstance(value, dict):
         items = [
@@ -88,7 +88,7 @@ def layout(value: Any, *, rows: bool = False, indent: str = "\n") -> str:
 
 
 def reason(error: Exception) -> str:
-    """Say why a file cannot be read or written."""
+    """Return why a file cannot be read or written."""
     text = getattr(error, "strerror", None) or str(error)
     return text[:1].lower() + text[1:]
 
@@ -102,9 +102,9 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) < len(pairs):
         twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
-        raise DemoError(f"the field {show(twice)} stands twice in one object; keep one")
+        raise DemoError(f"the field {show(twice)} appears twice in one object; keep one")
     if len(fields) > MAX_FIELDS:
-        raise DemoError(f"an object has {len(fields)} fields; no object of this format has so many")
+        raise DemoError(f"an object has {len(fields)} fields; this format has no such object")
     return fields
 
 

@@ -1,4 +1,4 @@
-"""What demonstrations need of an environment, whatever its kind."""
+"""What demonstrations and agents need of an environment, whatever its kind."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Environment(Protocol):
 
     @property
     def kind(self) -> str:
-        """Name of the kind of environment, as it stands in demonstration files."""
+        """Name of the kind of environment, as written in demonstration files."""
         ...
 
     @property
@@ -33,21 +33,21 @@ class Environment(Protocol):
         ...
 
     def replay(self, actions: Iterable[int]) -> NDArray[np.int64]:
-        """States that actions visit from the start on: int64 [T + 1] for T actions."""
+        """Return the states that T actions visit from the start on, int64 [T + 1]."""
         ...
 
     def goal_step(self, actions: Iterable[int]) -> int | None:
-        """After how many of the actions the goal is reached first; None if it is not."""
+        """Return how many of the actions it takes to reach the goal; None if they do not."""
         ...
 
     def cell(self, state: int) -> tuple[int, ...]:
-        """Return a state as the numbers that stand for it in a file."""
+        """Return the numbers by which files refer to a state."""
         ...
 
     def cells(self, states: NDArray[np.int64]) -> NDArray[np.int64]:
-        """States as the numbers that stand for them in a file, [state, number]."""
+        """Return the numbers by which files refer to states, [state, number]."""
         ...
 
     def describe(self) -> dict[str, Any]:
-        """Return the environment as plain JSON values, its `kind` among them."""
+        """Return the environment as plain JSON values, including its `kind`."""
         ...

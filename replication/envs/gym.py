@@ -18,21 +18,61 @@ from replication.envs.soccer import rules
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.rules import SoccerParams
 
-Array = NDArray[np.float64]
-
 _SMALL_MAP = ("....G", ".##..", ".....", "..##.", "S....")
-
-
 _CELL = 8  # side of a cell in an RGB image
-
-
 _COLOURS = {".": (255, 255, 255), "#": (64, 64, 64), "S": (158, 202, 225), "G": (161, 217, 155)}
-
-
 _AGENT_COLOUR = (214, 39, 40)
 
+_PIXELS = 200  # a metre
+_GRASS, _BALL, _GOAL = (44, 122, 62), (240, 140, 30), (230, 230, 230)
+_ROBOT, _OBSTACLE, _FRONT = (40, 80, 200), (235, 200, 30), (214, 39, 40)
 
-class MazeEnv(gymnasium.Env[Any, Any]):
+
+class _TabularEnv(gymnasium.Env[Any, Any]):
+    """Numbered states and actions, and the reward R(s, a) = weights[s, a]."""
+
+    def __init__(
+        self, n_states: int, n_actions: int, weights: ArrayLike | None, render_mode: str | None
+    ) -> None:
+        modes = self.metadata["render_modes"]
+        if render_mode not in (None, *modes):
+            raise ValueError(f"unknown render mode {render_mode!r}; known: {', '.join(modes)}")
+        self.render_mode = render_mode
+        self.weights = _checked_weights((n_states, n_actions), weights)
+        self.observation_space = gymnasium.spaces.Discrete(n_states)
+        self.action_space = gymnasium.spaces.Discrete(n_actions)
+        self._state: int | None = None
+
+    def _start(self) -> int:
+        raise NotImplementedError
+
+    def _move(self, state: int, action: int) -> tuple[int, bool, bool, dict[str, Any]]:
+        """Return the next state, whether it ends the episode, whether time is up, and more."""
+        raise NotImplementedError
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
+        """Go back to the start; the environment draws nothing from its seed."""
+        super().reset(seed=seed)
+        self._state = self._start()
+        return self._state, {}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Take an action; returns (state, reward, terminated, truncated, info)."""
+        if self._state is None:
+            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
+        if not self.action_space.contains(action):
+            last = self.weights.shape[1] - 1
+            raise gymnasium.error.InvalidAction(
+                f"there is no action {action!r}; actions are 0..{last}"
+            )
+        reward = self.weights.item(self._state, action)
+        self._state, terminated, truncated, info = self._move(self._state, action)
+        return self._state, reward, terminated, truncated, info
+
+
+class MazeEnv(_TabularEnv):
     """A maze as a Gymnasium environment, registered as ``replication/Maze-v0``.
 
     Observations are states, actions the numbers of `ACTIONS`. An episode starts at the start and
@@ -57,6 +97,7 @@ class MazeEnv(gymnasium.Env[Any, Any]):
 
     Examples
     --------
+    >>> from replication.envs.maze import ACTIONS
     >>> env = gymnasium.make("replication/Maze-v0", maze=["S.G"])
     >>> env.reset(seed=1)
     (0, {})
@@ -76,39 +117,20 @@ class MazeEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
     ) -> None:
         self.maze = maze if isinstance(maze, Maze) else Maze(tuple(maze))
-        self.weights = _checked_weights(self.maze.n_states, self.maze.n_actions, weights)
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"unknown render mode {render_mode!r}; known: ansi, rgb_array")
-        self.render_mode = render_mode
-        self.observation_space = gymnasium.spaces.Discrete(self.maze.n_states)
-        self.action_space = gymnasium.spaces.Discrete(self.maze.n_actions)
-        self._state: int | None = None
+        super().__init__(self.maze.n_states, self.maze.n_actions, weights, render_mode)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[int, dict[str, Any]]:
-        """Go to the start; the environment draws nothing from its seed."""
-        super().reset(seed=seed)
-        self._state = self.maze.start
-        return self._state, {}
+    def _start(self) -> int:
+        return self.maze.start
 
-    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Take one action; returns (state, reward, terminated, truncated, info)."""
-        if self._state is None:
-            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
-        if not self.action_space.contains(action):
-            raise gymnasium.error.InvalidAction(f"there is no action {action!r}; actions are 0..3")
-        reward = self.weights.item(self._state, action)
-        self._state = self.maze.next_state.item(self._state, action)
-        return self._state, reward, self._state == self.maze.goal, False, {}
+    def _move(self, state: int, action: int) -> tuple[int, bool, bool, dict[str, Any]]:
+        successor = self.maze.next_state.item(state, action)
+        return successor, successor == self.maze.goal, False, {}
 
     def render(self) -> Any:
         """Draw the maze and the agent; None without a render mode."""
         if self.render_mode == "ansi":
             return self._text()
-        if self.render_mode == "rgb_array":
-            return self._image()
-        return None
+        return self._image() if self.render_mode else None
 
     def _text(self) -> str:
         rows = [list(row) for row in self.maze.rows]
@@ -126,16 +148,11 @@ class MazeEnv(gymnasium.Env[Any, Any]):
         return image
 
 
-_PIXELS = 200  # a metre
-_GRASS, _BALL, _GOAL = (44, 122, 62), (240, 140, 30), (230, 230, 230)
-_ROBOT, _OBSTACLE, _FRONT = (40, 80, 200), (235, 200, 30), (214, 39, 40)
-
-
-class SoccerEnv(gymnasium.Env[Any, Any]):
+class SoccerEnv(_TabularEnv):
     """Robot soccer as a Gymnasium environment, registered as ``replication/Soccer-v0``.
 
-    Observations are states, actions the numbers of `replication.envs.soccer.rules.ACTIONS`. An episode
-    terminates with a goal and is truncated when the simulated time is up. There is no chance in it.
+    Observations are states, actions the numbers of `rules.ACTIONS`. An episode terminates with a
+    goal and is truncated when the simulated time is up. The world is deterministic.
 
     Parameters
     ----------
@@ -168,32 +185,14 @@ class SoccerEnv(gymnasium.Env[Any, Any]):
         weights: ArrayLike | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.weights = _checked_weights(rules.N_STATES, len(rules.ACTIONS), weights)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"unknown render mode {render_mode!r}; known: rgb_array")
-        self.render_mode = render_mode
+        super().__init__(rules.N_STATES, len(rules.ACTIONS), weights, render_mode)
         self.world = FastSoccerWorld(params)
-        self.observation_space = gymnasium.spaces.Discrete(rules.N_STATES)
-        self.action_space = gymnasium.spaces.Discrete(len(rules.ACTIONS))
-        self._state: int | None = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[int, dict[str, Any]]:
-        """Put everything in its place; the environment draws nothing from its seed."""
-        super().reset(seed=seed)
-        self._state = self.world.reset()
-        return self._state, {}
+    def _start(self) -> int:
+        return self.world.reset()
 
-    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Take a decision; returns (state, reward, terminated, truncated, info)."""
-        if self._state is None:
-            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
-        if not self.action_space.contains(action):
-            raise gymnasium.error.InvalidAction(f"there is no action {action!r}; actions are 0..4")
-        reward = self.weights.item(self._state, action)
-        self._state, scored, timed_out = self.world.step(action)
-        return self._state, reward, scored, timed_out, {"time": self.world.time}
+    def _move(self, state: int, action: int) -> tuple[int, bool, bool, dict[str, Any]]:
+        return *self.world.step(action), {"time": self.world.time}
 
     def render(self) -> Any:
         """Draw the field from above; None without a render mode."""
@@ -221,8 +220,7 @@ class SoccerEnv(gymnasium.Env[Any, Any]):
         return image
 
 
-def _checked_weights(n_states: int, n_actions: int, weights: ArrayLike | None) -> Array:
-    shape = n_states, n_actions
+def _checked_weights(shape: tuple[int, int], weights: ArrayLike | None) -> NDArray[np.float64]:
     array = np.zeros(shape) if weights is None else np.array(weights, dtype=np.float64)
     if array.shape != shape:
         raise ValueError(f"weights have shape {array.shape}; this environment needs {shape}")

@@ -1,9 +1,8 @@
 """Mazes drawn as text: a map and its table of moves.
 
 A map is a rectangle of the characters ``.`` free, ``#`` obstacle, ``S`` start and ``G`` goal. The
-edge of the map is a wall that is not drawn (choice WALLS). A move into an obstacle or off the map
-stays in place (choice BUMP). The table `Maze.next_state` is all there is to the dynamics: the
-learners and the Gymnasium environment in :mod:`replication.envs.gym` both read it.
+edge of the map is a wall (choice WALLS). A move into an obstacle or off the map stays in place
+(choice BUMP). The table `Maze.next_state` holds the whole dynamics.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _Array = TypeVar("_Array", bound=NDArray[Any])
 
 
 class MazeError(UserError):
-    """A map that is not a maze; the message is one line, with the place and the fix."""
+    """A map that is not a maze."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +46,13 @@ class Maze:
     Raises
     ------
     MazeError
-        If the map is empty, too large or not rectangular, holds an unknown character, does not
-        have exactly one start and one goal, or its goal cannot be reached.
+        If the map is empty, too large or not rectangular, has an unknown character, not exactly
+        one start and one goal, or no way between them.
 
     Notes
     -----
-    States number the cells line by line: ``state = row * n_columns + column``, with row 0 at the
-    top and column 0 at the left. Obstacle cells have numbers too, but cannot be entered.
+    States number the cells: ``state = row * n_columns + column``, with row 0 at the top and column
+    0 at the left. Obstacle cells have numbers too, but cannot be entered.
 
     Examples
     --------
@@ -80,17 +79,17 @@ class Maze:
             )
 
     def __reduce__(self) -> tuple[type[Maze], tuple[tuple[str, ...]]]:
-        """Copy and pickle the map alone, so that a copy's tables are read-only as well."""
+        """Copy and pickle the map alone, so that a copy's tables are read-only too."""
         return Maze, (self.rows,)
 
     @classmethod
     def from_text(cls, text: str) -> Maze:
-        """Read a maze from text, one line a row; blank margins around the map are ignored."""
+        """Read a maze from text, a row per line; margins are ignored."""
         return cls(tuple(line.strip() for line in text.strip().splitlines()))
 
     @property
     def kind(self) -> str:
-        """What kind of environment this is."""
+        """Kind of environment: "maze"."""
         return "maze"
 
     @property
@@ -100,7 +99,7 @@ class Maze:
 
     @property
     def n_states(self) -> int:
-        """Number of states: all cells, obstacles included."""
+        """Number of states: all cells."""
         return len(self.rows) * len(self.rows[0])
 
     @property
@@ -110,7 +109,7 @@ class Maze:
 
     @property
     def actions(self) -> tuple[str, ...]:
-        """Names of the actions."""
+        """Names of actions."""
         return ACTIONS
 
     @cached_property
@@ -125,15 +124,15 @@ class Maze:
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Whether a state can be entered, bool [state], read-only."""
+        """Whether a state can be entered: bool [state], read-only."""
         return _read_only(np.array([character != "#" for character in "".join(self.rows)]))
 
     @cached_property
     def next_state(self) -> NDArray[np.int64]:
-        """The state that an action leads to, int64 [state, action], read-only.
+        """The state that an action leads to: int64 [state, action], read-only.
 
-        Obstacle cells lead to themselves. The goal is a cell like any other: that an episode ends
-        there is left to the environment and the learner.
+        Obstacle cells lead to themselves, and the goal is a cell like any other: environment and
+        learner end an episode there.
         """
         n_rows, n_columns = self.shape
         states = np.arange(self.n_states)
@@ -146,18 +145,18 @@ class Maze:
         return _read_only(table)
 
     def cell(self, state: int) -> tuple[int, int]:
-        """Row and column of a state."""
+        """Return the row and column of a state."""
         if not 0 <= state < self.n_states:
             raise MazeError(f"there is no state {state}; states are 0..{self.n_states - 1}")
         row, column = divmod(int(state), self.shape[1])
         return row, column
 
     def cells(self, states: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Rows and columns of many states [n], as int64 [n, 2]; the states are not checked."""
+        """Return rows and columns of states [n], int64 [n, 2]; the states are not checked."""
         return np.stack(np.divmod(states, self.shape[1]), axis=1)
 
     def state(self, row: int, column: int) -> int:
-        """State of a row and column."""
+        """Return the state of a row and column."""
         n_rows, n_columns = self.shape
         if not (0 <= row < n_rows and 0 <= column < n_columns):
             raise MazeError(
@@ -167,7 +166,7 @@ class Maze:
         return int(row) * n_columns + int(column)
 
     def distances(self, to: int | None = None) -> NDArray[np.int64]:
-        """Least number of moves from each state to the state `to` (default: the goal).
+        """Return the least number of moves from each state to `to` (default: the goal).
 
         Returns
         -------
@@ -180,19 +179,19 @@ class Maze:
         return self._breadth_first(to)
 
     def replay(self, actions: Iterable[int]) -> NDArray[np.int64]:
-        """States that actions visit from the start on: int64 [T + 1] for T actions."""
+        """Return the states that T actions visit from the start on, int64 [T + 1]."""
         states = [self.start]
         for action in actions:
             states.append(self.next_state.item(states[-1], action))
         return np.array(states, dtype=np.int64)
 
     def goal_step(self, actions: Iterable[int]) -> int | None:
-        """After how many of the actions the goal is reached first; None if it is not."""
+        """Return how many of the actions it takes to reach the goal; None if they do not."""
         at_goal = np.flatnonzero(self.replay(actions) == self.goal)
         return int(at_goal[0]) if at_goal.size else None
 
     def describe(self) -> dict[str, Any]:
-        """Return the maze as plain JSON values."""
+        """Return plain JSON values."""
         return {
             "kind": self.kind,
             "map": list(self.rows),
@@ -206,7 +205,7 @@ class Maze:
         return self._breadth_first(self.goal)
 
     def _breadth_first(self, origin: int) -> NDArray[np.int64]:
-        neighbours = self.next_state.tolist()  # a move can be taken back: predecessors as well
+        neighbours = self.next_state.tolist()  # each move can be reversed: predecessors as well
         distance = [-1] * self.n_states
         distance[origin] = 0
         queue = deque([origin])
@@ -220,13 +219,7 @@ class Maze:
 
 
 def as_maze(environment: Environment) -> Maze:
-    """Return an environment that has to be a maze.
-
-    Raises
-    ------
-    MazeError
-        If it is of another kind.
-    """
+    """Return the environment if it is a maze; raises `MazeError` if it is not."""
     if not isinstance(environment, Maze):
         raise MazeError(
             f"a maze is needed here, but this environment is of kind {environment.kind!r}"

@@ -1,9 +1,9 @@
 """AdaBoost-IRL: our reconstruction of the paper's baseline, and the readings it was chosen from.
 
 The paper names AdaBoost-IRL [24] but prints neither its update nor, in the text we have, its
-reference. Public abstracts say that each state gets its own weight by AdaBoost from the difference
-between expert and agent. What stands here is therefore a labelled reconstruction (choice
-ADABOOST-RULE): a verdict against it is a verdict against the reconstruction.
+reference. Public abstracts say that AdaBoost gives each state its own weight from the difference
+between expert and agent. This is therefore a labelled reconstruction (choice ADABOOST-RULE): a
+verdict against it is a verdict against the reconstruction.
 
 All rules keep a distribution D over state-action pairs, as AdaBoost does over examples.
 """
@@ -35,7 +35,7 @@ def update(
     mu_e, mu_i
         Feature expectations of the expert and of the agent.
     mu_b
-        Not used: the baseline knows no incorrect demonstrations.
+        Not used: the baseline has no use for incorrect demonstrations.
     params
         Rule (choice ADABOOST-RULE) and margin (choice ADABOOST-MARGIN).
 
@@ -61,8 +61,8 @@ def update(
     ``log-odds``
         No distribution: w <- w + ln((1 + r) / (1 - r)) / 2, r the residual over its maximum.
 
-    The error is kept `adaboost_margin` below one half, else the same set of mismatches would have
-    an error of exactly one half after AdaBoost's own reweighting and D would never move again.
+    The error is kept `adaboost_margin` below one half. Otherwise the same mismatches would have an
+    error of exactly one half after AdaBoost's reweighting, and D would never move again.
     """
     residual = mu_e - mu_i
     size = np.abs(residual)

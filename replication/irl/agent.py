@@ -1,7 +1,7 @@
-"""What the IRL loop needs of a learner: Q from reward weights, and a greedy episode from Q.
+"""What the IRL loop needs of an agent: Q from reward weights, and a greedy episode from Q.
 
-A new kind of task is a class with these two methods in a module of its own, see
-:mod:`replication.trials.condition`; nothing in the loop or in the methods changes.
+A new kind of task needs a class with these two methods, in its own module, see
+:mod:`replication.trials.condition`; the loop and the methods stay as they are.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Episode(NamedTuple):
     Attributes
     ----------
     states
-        int64 [T + 1], the last being where it ended.
+        int64 [T + 1]; the last is where it ended.
     actions
         int64 [T].
     hits
@@ -34,7 +34,7 @@ class Episode(NamedTuple):
 
 
 class Agent(Protocol):
-    """A learner on a task with a finite number of states and actions."""
+    """A learner in an environment with finitely many states and actions."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -43,19 +43,19 @@ class Agent(Protocol):
 
     @property
     def batch_size(self) -> int:
-        """How many trials are best learned in one call."""
+        """Number of trials that are best learned in one call."""
         ...
 
     def learn(
         self, weights: Array, q: Array, streams: Streams
     ) -> tuple[Array, Streams, NDArray[np.int64]]:
-        """Return the learned tables, the streams' new positions and the steps taken.
+        """Return the learned tables, the advanced streams and the number of steps.
 
         The arrays are `[trial, state, action]`, `[trial, 4]` and `[trial]`; a trial's result must
-        not depend on the other trials.
+        not depend on other trials.
         """
         ...
 
     def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
-        """Return a greedy episode, and the stream's position after it."""
+        """Return a greedy episode and the advanced stream."""
         ...

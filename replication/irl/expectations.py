@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 
 class Trajectory(Protocol):
-    """Anything with `states` [T + 1] and `actions` [T], the last state being where it ended."""
+    """Anything with `states` [T + 1] and `actions` [T]; the last state is where it ended."""
 
     @property
     def states(self) -> NDArray[np.int64]:
@@ -71,8 +71,8 @@ def expert_expectations(
 ) -> NDArray[np.float64]:
     """Return mu_E [state, action], the mean over the correct demonstrations (Eq. 5).
 
-    Equal demonstrations are weighed, not added up, so that any number of them has the bits of one:
-    else rounding alone would keep d from reaching zero.
+    Equal demonstrations are weighted, not added up, so that any number of them has the bits of one:
+    rounding alone would otherwise keep d from reaching zero.
     """
     counts: dict[tuple[bytes, bytes], int] = {}
     each: dict[tuple[bytes, bytes], NDArray[np.float64]] = {}
@@ -87,8 +87,8 @@ def expert_expectations(
 def visited(demos: Iterable[Trajectory], *, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Return where mu_B of Eq. 11 is not zero: the pairs that any of the demonstrations visits.
 
-    Eq. 11 counts visits without discount, and Algorithm 2 asks only whether there are any; see
-    choice INCORRECT-INDICATOR.
+    Eq. 11 counts visits without discount, and Algorithm 2 asks only whether there are any (choice
+    INCORRECT-INDICATOR).
 
     Returns
     -------
@@ -103,8 +103,8 @@ def visited(demos: Iterable[Trajectory], *, shape: tuple[int, int]) -> NDArray[n
 def norm(values: NDArray[np.float64]) -> float:
     """Return the Euclidean norm of an array (Eqs. 4 and 6).
 
-    The squares are summed exactly and rounded once. NumPy's own norm leaves the order of the sum
-    to a BLAS library, which chooses it by the processor, and the last bit with it.
+    The squares are summed exactly and rounded once. In NumPy's own norm a BLAS library chooses the
+    order of the sum by the processor, and with it the last bit.
 
     Examples
     --------

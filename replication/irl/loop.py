@@ -1,7 +1,7 @@
-"""The loop of Algorithms 1 and 2, one for all methods and tasks.
+"""The loop of Algorithms 1 and 2, the same for all methods and tasks.
 
-A trial is a generator: it yields the reward weights from which Q is to be learned and is sent the
-learned table. So the loop reads as the listings do, one trial at a time, while :func:`run` collects
+A trial is a generator: it yields the reward weights from which Q is to be learned, and is sent the
+learned table. So the loop reads like the listings, one trial at a time, while :func:`run` collects
 the requests of many trials and lets the agent learn them together.
 """
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Request(NamedTuple):
-    """What a trial asks of the learner: Q from reward weights, going on from a table and stream."""
+    """What a trial asks of the agent: to learn from weights, starting with this Q and stream."""
 
     weights: Array
     q: Array
@@ -32,7 +32,7 @@ class Request(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """The learned table, the stream's new position and the number of learning steps."""
+    """The learned table, the advanced stream and the number of learning steps."""
 
     q: Array
     stream: NDArray[np.uint64]
@@ -41,7 +41,7 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Snapshots:
-    """What one trial went through: entry i is the state after i weight updates.
+    """The weights and Q-tables of every iteration of a trial: entry i is after i weight updates.
 
     Both are `[iteration, state, action]`.
     """
@@ -59,18 +59,18 @@ class Trial:
     errors
         d_0 ... d_n (Eq. 6), one for each trajectory of the agent; n is the number of iterations.
     converged
-        Whether the last error is within the threshold; else the trial ended at the cap.
+        Whether the last error is within the threshold; otherwise the trial ended at the cap.
     steps
         Learning steps in the environment, over all iterations.
     weights, q
         The last reward weights and Q-table, `[state, action]`.
     episodes
-        The agent's trajectory before each update and after the last one, as many as errors.
+        The agent's trajectory before each update and after the last one; as many as errors.
     values
-        max_a Q(s, a) `[iteration, state]` in the states where the expert acts, in ascending order
-        of the states: entry i after i updates. Single precision, as it is for reports only.
+        max_a Q(s, a) `[iteration, state]` in the states where the expert acts, in ascending order;
+        entry i is after i updates. In single precision, as it only serves reports.
     snapshots
-        Every iteration, where they were asked for.
+        Every iteration, if requested.
     """
 
     errors: Array
@@ -103,7 +103,7 @@ def iterate(
     Parameters
     ----------
     agent
-        Rolls Q out to a trajectory; it is :func:`run` that lets it learn.
+        Follows the greedy policy of Q; it is :func:`run` that lets it learn.
     method
         The weight update.
     mu_e, mu_b
@@ -112,10 +112,10 @@ def iterate(
     params
         Parameters of the loop and of the update.
     seed
-        The trial's own seed: its learning, its trajectories and its first weights draw from three
+        The seed of the trial: its learning, its trajectories and its first weights draw from three
         children of it.
     keep
-        Whether to keep the snapshots of every iteration.
+        Whether to keep a snapshot of every iteration.
 
     Notes
     -----
@@ -162,9 +162,9 @@ def iterate(
 def run(
     agent: Agent, trials: Iterable[Generator[Request, Answer, Trial]]
 ) -> Iterator[tuple[int, Trial]]:
-    """Run trials side by side, yielding each one's position and outcome as it finishes.
+    """Run trials side by side; yield the position and outcome of each as it finishes.
 
-    The trials learn in one call of `agent.learn` an iteration; what comes out of a trial does not
+    All trials learn in one call of `agent.learn` per iteration; the outcome of a trial does not
     depend on the others.
     """
     live = dict(enumerate(trials))

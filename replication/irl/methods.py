@@ -1,4 +1,4 @@
-"""The registry of methods: each is a start and an update for one loop."""
+"""The registry of methods: each is a start and an update for the one loop."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Method:
-    """An IRL method, and all that the rest of the package has to know of it.
+    """An IRL method, and all that the rest of the package needs to know about it.
 
     Attributes
     ----------
     name, label, colour
-        For parameters and data; for tables and figures; for figures.
+        Its name in parameters and data, in tables and figures, and its colour in figures.
     readings
-        The readings of Eq. 9 (choice F-INDEX) under which it is run; one empty text if it has no
+        The readings of Eq. 9 (choice F-INDEX) under which it is run; a single "" if it has no
         trace.
     uses_incorrect
-        Whether mu_B is given to the update; otherwise it sees no incorrect pair.
+        Whether the update is given mu_B; otherwise it sees no incorrect pair.
     baseline
-        The method that it is compared with, if any.
+        Name of the method that it is compared with, or "".
     start
-        Returns what the update remembers before the first iteration, `[state, action]`.
+        Returns the memory of the update before the first iteration, `[state, action]`.
     update
-        Returns the next reward weights and memory from the present ones, mu_E, mu_i and mu_B.
+        Returns the next weights and memory, given the current ones, mu_E, mu_i and mu_B.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Method:
 
 
 READINGS = ("printed", "updated")
-"""Both readings of Eq. 9 (choice F-INDEX), reported side by side everywhere."""
+"""Both readings of Eq. 9 (choice F-INDEX); they are reported side by side everywhere."""
 
 METHODS: dict[str, Method] = {
     method.name: method
@@ -97,7 +97,7 @@ def get_method(name: str) -> Method:
     Raises
     ------
     ChoiceError
-        If there is none; the error lists those that exist.
+        If there is none; the message lists those that exist.
 
     Examples
     --------

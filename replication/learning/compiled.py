@@ -1,15 +1,16 @@
-"""Everything that is compiled: Q-learning on many trials at once, and greedy roll-outs.
+"""The compiled learner: Q-learning on many trials at once, and greedy roll-outs.
 
-`replication.learning.reference` defines what is computed, in plain Python; this module returns its bits.
+:mod:`replication.learning.reference` defines what is computed, in plain Python; this module returns
+the same bits.
 
-A step of Q-learning is a chain of dependent operations, so that a core on one trial mostly waits.
+A step of Q-learning is a chain of dependent operations, so a core that runs one trial mostly waits.
 Therefore trials advance in lock step, eight to a group, each in its lane of a SIMD vector, and two
 groups take turns, so that one computes while the other waits. Numba has no vectors: `_advance`
-writes LLVM's instructions through `_Vector`, and LLVM breaks them down to what the processor has.
-The last few trials, too few for a group, run one after the other in `_finish`.
+writes LLVM's instructions through `_Vector`, and LLVM lowers them to what the processor has. The
+last few trials, too few for a group, run one after the other in `_finish`.
 
-All of it stands in one file because numba renews its cache on disk only when the file of the cached
-function changes: a compiled function must not call what is compiled from another file.
+This is one file because numba renews its cache on disk only when the file of the cached function
+changes: a compiled function must not call what is compiled from another file.
 """
 
 # Numba infers the types of compiled functions and hands an intrinsic its first argument; llvmlite
@@ -27,7 +28,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 LANES = 8
-WORTHWHILE = 5  # trials from which a group is faster than they are one after the other
+WORTHWHILE = 5  # from this many trials on, a group is faster than one trial after the other
 STATE, TIME, LEFT, STEPS = range(4)  # a trial's progress; LEFT is the number of episodes left
 LOW, HALF = np.uint64(2**32 - 1), np.uint64(32)
 
@@ -45,16 +46,16 @@ class Rule(NamedTuple):
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function, and keep the result on disk if there is a writable place for it."""
+    """Compile a function, and cache the result on disk if there is a writable place for it."""
     try:
         return njit(nogil=True, cache=True)(function)
     except RuntimeError:  # neither the package's folder nor the user's can be written
         return njit(nogil=True)(function)
 
 
-# One trial. `actions` is a tuple whose length is the number of actions: so the compiler knows it,
-# as a part of the signature, and unrolls the loops over actions. A state's values and rewards stand
-# side by side in `table` [state, 2, action]: with four actions they share a cache line.
+# One trial. `actions` is a tuple whose length is the number of actions: as part of the signature,
+# it lets the compiler unroll the loops over actions. A state's values and rewards lie side by side
+# in `table` [state, 2, action]: with four actions they share a cache line.
 
 
 @_compiled
@@ -76,7 +77,7 @@ def choose(actions, row, stream, threshold, random_ties):
     high, low = _draw(stream)
     if high < threshold:
         return low * len(actions) >> 32
-    # Branches, unlike in a vector: a predicted action lets the next step begin before its time.
+    # Branches, unlike in a vector: a predicted action lets the next step start early.
     best, action, ties = row[0], 0, 1
     for a in range(1, len(actions)):
         if row[a] > best:
@@ -134,7 +135,7 @@ INDICES = [ir.IntType(32)(lane) for lane in range(LANES)]
 
 
 def _operator(name: str) -> Callable[["_Vector", Any], "_Vector"]:
-    """Return an operator that appends an instruction, in its form for floats if need be."""
+    """Return an operator that appends an instruction, in its form for floats where needed."""
 
     def operator(self: "_Vector", other: Any) -> "_Vector":
         prefix = "f" if self.value.type.element == FLOAT else ""
@@ -151,7 +152,7 @@ class _Vector:
         self.builder, self.value = builder, value
 
     def like(self, other: Any) -> "_Vector":
-        """Return a vector as it is, and a number as a vector of this one's type filled with it."""
+        """Return a vector unchanged, and a number as a vector of this type filled with it."""
         if isinstance(other, _Vector):
             return other
         return _Vector(self.builder, self.value.type(other))
@@ -180,11 +181,11 @@ class _Vector:
         return self.builder.icmp_unsigned("!=", lanes, lanes.type(0))
 
     def count(self) -> "_Vector":
-        """Return this mask as numbers, 0 or 1."""
+        """Return this mask as numbers 0 and 1."""
         return _Vector(self.builder, self.builder.zext(self.value, ir.VectorType(WORD, LANES)))
 
     def load(self, element: Any) -> "_Vector":
-        """Return what is stored at these addresses."""
+        """Return the values stored at these addresses."""
         kind = ir.VectorType(element, LANES)
         masks, pointers = ir.VectorType(BIT, LANES), ir.VectorType(ir.PointerType(), LANES)
         size = ir.IntType(32)
@@ -214,7 +215,7 @@ def _spread(builder: Any, scalar: Any) -> _Vector:
 
 
 def _largest(row: list[_Vector]) -> _Vector:
-    """Return the maximum, the first one if there are zeros of both signs."""
+    """Return the maximum; of zeros of both signs, the first."""
     best = row[0]
     for value in row[1:]:
         best = value.compare(">", best).select(value, best)
@@ -224,8 +225,8 @@ def _largest(row: list[_Vector]) -> _Vector:
 def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector]) -> list[_Vector]:
     """Append one step of one group.
 
-    The loop's variables are the stream, the state, the time, the episodes left, and the values of
-    the state's actions, which are kept from when they were read as those of the successor.
+    The variables of the loop are the stream, the state, the time, the episodes left, and the values
+    of the state's actions, which were read when it was the successor.
     """
     s0, s1, s2, s3, state, time, left, *row = lanes
     builder, actions = state.builder, len(row)
@@ -262,10 +263,10 @@ def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector])
     value = at_goal.select(0.0, _largest(row))
     new = old + rule.beta * (reward + rule.gamma * value - old)
     at.store(new)
-    # The row was read before the store, which may have been to one of its places.
+    # The row was read before the store, which may have changed one of its places.
     row = [x.compare("==", at).select(new, value) for x, value in zip(places, row, strict=True)]
     # After a time-out the next state is not the one whose value is in the target. This branch comes
-    # last: LLVM would move a gather from before it to behind it, which costs a fifth of the speed.
+    # last: LLVM would move a gather from before it to after it, which costs a fifth of the speed.
     follow = late.select(rule.start, follow)
     variables = [cgutils.alloca_once_value(builder, x.value) for x in row]
     with builder.if_then(late.any(), likely=False):
@@ -278,7 +279,7 @@ def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector])
 
 @intrinsic
 def _advance(typing_context, groups, actions, streams, progress, tables, successors, rule):
-    """Let groups of trials take steps together until one trial has finished its episodes.
+    """Let groups of trials take steps together until some trial has finished its episodes.
 
     The tuple `groups` has an array of eight trials for each group. Returns the number of steps.
     """

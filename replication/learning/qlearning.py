@@ -1,8 +1,8 @@
 """Q-learning (Eq. 1) and greedy roll-outs on tabular tasks, many trials at a time.
 
-`replication.learning.reference` defines what is computed, in plain Python, for one trial: read it first.
-The functions here check their arguments and return the same bits from `replication.learning.compiled`, which
-is compiled.
+:mod:`replication.learning.reference` defines what is computed, in plain Python: read it first. The
+functions here check their arguments and return the same bits from
+:mod:`replication.learning.compiled`.
 """
 
 import operator
@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Words = NDArray[np.uint64]
 
-MAX_ACTIONS = 16  # the time to compile grows with it
-LARGEST = 1e280  # far enough from overflow: a NaN would have no largest action
+MAX_ACTIONS = 16  # compilation takes longer with more
+LARGEST = 1e280  # far from overflow: among NaN no action is the largest
 MAX_COUNT = 2**31 - 1  # so that the number of steps fits in an int64
 
 
@@ -39,7 +39,7 @@ def learn(
 ) -> tuple[Floats, Words, Ints]:
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``, trial by trial.
 
-    A trial's result depends on its own stream, weights and Q only, to the last bit.
+    To the last bit, a trial's result depends only on its own stream, weights and Q.
 
     Parameters
     ----------
@@ -48,14 +48,14 @@ def learn(
     weights, q
         Rewards and initial values, float64 [trial, state, action].
     streams
-        Random streams, uint64 [trial, 4], see `stream`. A step takes one draw, which
-        `replication.learning.reference` describes.
+        Random streams, uint64 [trial, 4], see :func:`replication.learning.seeds.stream`. A step
+        takes one draw, see :func:`replication.learning.reference.choose`.
     start, goal
         States. Every episode begins in ``start`` and ends on reaching ``goal``, which is worth 0
         in the target whatever its row of Q says (choice GOAL-VALUE).
     episodes, horizon
-        Episodes a trial, and steps after which an episode ends without having reached the goal.
-        Such a time-out is not terminal: its target bootstraps.
+        Number of episodes, and of steps after which one ends short of the goal. Such a time-out
+        is not terminal: its target bootstraps.
     beta, gamma, epsilon
         Learning rate, discount and probability of exploring, each in [0, 1].
     random_ties
@@ -118,7 +118,7 @@ def roll_out(
 
 
 def _actions(successors: Ints) -> tuple[int, ...]:
-    """Return a tuple as long as there are actions, the form in which the kernel wants them."""
+    """Return a tuple with an entry per action, as the compiled functions need it."""
     return (0,) * successors.shape[1]
 
 

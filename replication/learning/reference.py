@@ -1,12 +1,11 @@
-"""The learner in plain Python, one trial at a time: the definition that the fast kernel must match.
+"""The learner in plain Python, one trial at a time: the definition that fast code must match.
 
-`replication.learning.qlearning` computes the same two functions many times faster and is tested to return
-the same bits. Read this module to see what is computed and that one to see how. All tables are
-lists of rows, ``table[state][action]``; a random stream is a list of four 64-bit words, the state
-of a xoshiro256++ generator [1]_.
+:mod:`replication.learning.qlearning` has the same two functions, many times faster, and is tested
+to return the same bits. All tables are lists of rows, ``table[state][action]``. A random stream is
+a list of four 64-bit words, the state of a xoshiro256++ generator [1]_.
 
 Each step takes **one** 64-bit draw. Its high half decides whether to explore, and its low half
-which of the candidate actions is taken: all of them if exploring, else those of greatest value.
+which of the candidates is taken: all actions if exploring, else those of greatest value.
 
 References
 ----------
@@ -36,7 +35,7 @@ def learn(
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
 
     An episode ends on reaching ``goal``, which is worth 0 (choice GOAL-VALUE), or after ``horizon``
-    steps; such a time-out is not terminal, so its target bootstraps as any other. Returns the new
+    steps; such a time-out is not terminal, so its target bootstraps like any other. Returns the new
     Q, the stream after the last draw, and the number of steps.
 
     Examples
@@ -102,8 +101,8 @@ def roll_out(
 def choose(row: list[float], word: int, epsilon: float, random_ties: bool) -> int:
     """Pick an action from a state's values by one 64-bit random word.
 
-    The probability of exploring is ``epsilon`` to within 2**-33, that of each of k candidates
-    1 / k to within 2**-32.
+    The probability of exploring is ``epsilon`` to within 2**-33, and that of each of k candidates
+    is 1 / k to within 2**-32.
     """
     high, low = divmod(word, HALF)
     if high < round(epsilon * HALF):

@@ -18,7 +18,7 @@ def trial_seeds(root: int, n: int) -> list[np.random.SeedSequence]:
 
 
 def child(seed: np.random.SeedSequence, k: int) -> np.random.SeedSequence:
-    """Return child k of `seed`, whatever was spawned from it before."""
+    """Return child k of `seed`, no matter what was spawned from it before."""
     return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, k))
 
 

@@ -1,8 +1,8 @@
-"""Q-learning and greedy roll-outs in robot soccer, compiled.
+"""Q-learning (Eq. 1) and greedy roll-outs in robot soccer, compiled.
 
-The rules are those of `replication.learning.reference`: a decision takes one draw, a goal is worth 0 in the
-target, and a time-out is not terminal, so its target bootstraps. Epsilon falls over the episodes of
-one call (choice EPSILON-END).
+The rules are those of :mod:`replication.learning.reference`: a decision takes one draw, a goal is
+worth 0 in the target, and a time-out is not terminal, so its target bootstraps. Epsilon falls over
+the episodes of one call (choice EPSILON-END).
 """
 
 # Numba infers the types of compiled functions.
@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 Words = NDArray[np.uint64]
 Flags = NDArray[np.bool_]
 
-_ACTIONS = (0,) * len(ACTIONS)  # a tuple as long as there are actions, as the kernel wants it
+_ACTIONS = (0,) * len(ACTIONS)  # an entry per action, as `compiled.choose` needs it
 
 
 def learn_trial(
@@ -49,9 +49,9 @@ def learn_trial(
     weights, q
         Rewards and initial values, float64 [state, action].
     stream
-        A random stream, uint64 [4], see `replication.learning.seeds.stream`.
+        A random stream, uint64 [4], see :func:`replication.learning.seeds.stream`.
     episodes
-        Number of episodes; each ends with a goal or when the time is up.
+        Number of episodes; each ends with a goal or when time is up.
     beta, gamma
         Learning rate and discount, in [0, 1].
     epsilon_start, epsilon_end
@@ -59,7 +59,7 @@ def learn_trial(
     random_ties
         Break ties at random, or else by the lowest action.
     bootstrap_goal
-        Look ahead at a goal as well, instead of giving it the value 0 (choice GOAL-VALUE).
+        Let the target look beyond a goal, too, instead of valuing it at 0 (choice GOAL-VALUE).
 
     Returns
     -------
@@ -104,8 +104,8 @@ def roll_out(
     """Follow the greedy policy of ``q`` [state, action] for an episode.
 
     Returns the states, int64 [T + 1]; the actions, int64 [T]; whether the robot touched an obstacle
-    or a wall meanwhile, bool [T]; and the stream after T draws. Raises ValueError as `learn_trial`
-    does.
+    or a wall during each, bool [T]; and the stream after T draws. Raises ValueError like
+    `learn_trial`.
     """
     values, words = _table("q", q), _words(stream)
     keep: list[Any] = []
@@ -114,8 +114,8 @@ def roll_out(
     return states, actions, hits, words
 
 
-# These call what is compiled from other files. Numba would not notice if those change, so it must
-# not keep these two on disk; they are small.
+# These two call what is compiled from other files. Numba would not notice a change there, so they
+# are not cached on disk; they are small.
 
 
 @njit

@@ -1,7 +1,7 @@
 """Parameters of the replication: one frozen dataclass for each concern.
 
-Every field is a choice in the register (:mod:`replication.paper.register`), which holds its default, the
-reason for it and the values that are accepted. The id stands behind each field.
+Every field is a choice in the register, see :mod:`replication.paper.register`, which holds its
+default, the reason for it and the accepted values.
 """
 
 from __future__ import annotations
@@ -16,51 +16,51 @@ from replication.paper.register import ChoiceError, Chosen, Value, choice, load_
 
 @dataclass(frozen=True)
 class Demonstrations(Chosen):
-    """Which of a file's incorrect demonstrations are used."""
+    """Which of the incorrect demonstrations in a file are used."""
 
-    incorrect: str = choice("INCORRECT-KINDS")
+    incorrect: str = choice("INCORRECT-KINDS")  # kinds joined by "+", or "all" or "none"
 
 
 @dataclass(frozen=True)
 class Learner(Chosen):
     """Q-learning, Eq. 1: rates, episodes and the rules for ties and starts."""
 
-    beta: float = choice("BETA")
-    gamma: float = choice("GAMMA")
-    epsilon: float = choice("EPSILON")
-    epsilon_end: float = choice("EPSILON-END")
-    episodes: int = choice("EPISODES")
-    horizon: int = choice("HORIZON")
-    q_start: str = choice("Q-START")
-    ties: str = choice("TIES")
-    goal_value: str = choice("GOAL-VALUE")
+    beta: float = choice("BETA")  # learning rate
+    gamma: float = choice("GAMMA")  # discount factor, also of feature expectations
+    epsilon: float = choice("EPSILON")  # probability of exploring, in the first episode
+    epsilon_end: float = choice("EPSILON-END")  # the same in the last episode; linear in between
+    episodes: int = choice("EPISODES")  # in each iteration
+    horizon: int = choice("HORIZON")  # steps after which an episode is cut
+    q_start: str = choice("Q-START")  # whether Q is kept or reset in each iteration
+    ties: str = choice("TIES")  # which of equally good actions is taken while learning
+    goal_value: str = choice("GOAL-VALUE")  # what the target expects beyond the goal
 
 
 @dataclass(frozen=True)
 class Loop(Chosen):
     """The outer loop of Algorithms 1 and 2, the same for all methods."""
 
-    threshold: float = choice("THRESHOLD")
-    max_iterations: int = choice("ITERATION-CAP")
-    w_start: str = choice("W-START")
-    w_norm: str = choice("W-NORM")
-    rollout_ties: str = choice("ROLLOUT-TIES")
+    threshold: float = choice("THRESHOLD")  # converged if d is at most this
+    max_iterations: int = choice("ITERATION-CAP")  # weight updates before giving up
+    w_start: str = choice("W-START")  # reward weights before the first iteration
+    w_norm: str = choice("W-NORM")  # whether their norm is kept at 1
+    rollout_ties: str = choice("ROLLOUT-TIES")  # which of equally good actions the trajectory takes
 
 
 @dataclass(frozen=True)
 class Update(Chosen):
     """The weight update, Eqs. 8-10, and that of the AdaBoost-IRL reconstruction."""
 
-    f_index: str = choice("F-INDEX")
-    alpha: float = choice("ALPHA")
-    f_start: float = choice("F-START")
-    adaboost_rule: str = choice("ADABOOST-RULE")
-    adaboost_margin: float = choice("ADABOOST-MARGIN")
+    f_index: str = choice("F-INDEX")  # reading of Eq. 9: F_i ("printed") or F_(i+1) ("updated")
+    alpha: float = choice("ALPHA")  # rate at which the trace F changes
+    f_start: float = choice("F-START")  # F_0
+    adaboost_rule: str = choice("ADABOOST-RULE")  # reading of AdaBoost-IRL
+    adaboost_margin: float = choice("ADABOOST-MARGIN")  # how far its error stays below 1/2
 
 
 @dataclass(frozen=True)
 class Params:
-    """All that determines a trial, given the task, the method, the demos and the seed."""
+    """All that determines a trial besides its demonstrations, its method and its seed."""
 
     demonstrations: Demonstrations = field(default_factory=Demonstrations)
     learner: Learner = field(default_factory=Learner)
@@ -69,7 +69,7 @@ class Params:
 
     @classmethod
     def of(cls, **values: Any) -> Params:
-        """Build parameters from field names alone, the others at their defaults.
+        """Build parameters from some fields by name, with all others at their defaults.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Params:
         return cls(**{part: _PARTS[part](**chosen[part]) for part in _PARTS})  # type: ignore[arg-type]
 
     def values(self) -> dict[str, Value]:
-        """Return every value by its field name, in a fixed order."""
+        """Return all values by field name, in a fixed order."""
         return {
             name: getattr(getattr(self, part), name)
             for part, kind in _PARTS.items()
@@ -98,7 +98,7 @@ class Params:
         }
 
     def differences(self) -> dict[str, Value]:
-        """Return the values that are not the registered defaults, by the id of their choice."""
+        """Return the values that differ from the registered defaults, by the id of their choice."""
         changed: dict[str, Value] = {}
         for part in _PARTS:
             concern = getattr(self, part)

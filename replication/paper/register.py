@@ -1,8 +1,7 @@
 """The register of choices: what the paper leaves open, what we chose, and what else is accepted.
 
-The register itself is the data file ``choices.toml``. This module reads it and gives parameter
-dataclasses their fields: a field declared with :func:`choice` takes its default from the register
-and accepts exactly the values that are registered for it.
+The register itself is the data file ``choices.toml``. A dataclass field declared with
+:func:`choice` takes its default from the register and accepts exactly the registered values.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ Value = str | int | float
 
 
 class ChoiceError(UserError):
-    """A parameter has a name or a value that the register does not know."""
+    """A name or value of a parameter that is not in the register."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Choice:
 
     @property
     def accepted(self) -> str:
-        """The accepted values in words, for error messages and tables."""
+        """The accepted values, in words, for messages and tables."""
         if self.range is not None:
             low, high = self.range
             kind = "a whole number" if isinstance(self.default, int) else "a number"
@@ -77,7 +76,7 @@ def load_choices() -> dict[str, Choice]:
     Raises
     ------
     ChoiceError
-        If the file has an entry with an unknown key or an id twice.
+        If an entry has an unknown key, or an id occurs twice.
     """
     text = resources.files("replication.paper").joinpath("choices.toml").read_text(encoding="utf-8")
     entries: dict[str, Choice] = {}
@@ -99,7 +98,7 @@ def choice(id: str) -> Any:
 
 
 class Chosen:
-    """Base of the parameter dataclasses: each field is a registered choice and is checked."""
+    """Base of parameter dataclasses, whose fields are registered choices and are checked."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):  # type: ignore[arg-type]

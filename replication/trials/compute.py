@@ -1,7 +1,8 @@
-"""Compute trials: what runs in a worker, and the key under which a trial is filed.
+"""Compute trials: what runs in a worker, and the key under which a trial is stored.
 
-The key hashes all that determines a trial, the code included: this module, those of the agent and
-of the method's update, and whatever they import. Reading files, scheduling, storing and reporting are not among them.
+The key hashes all that determines a trial, including the code: this module, those of the agent and
+of the method's update, and whatever they import. Reading files, scheduling, storing and reporting
+do not count.
 """
 
 from __future__ import annotations
@@ -21,29 +22,29 @@ from replication.source import source_hash
 from replication.trials.condition import Condition
 
 TRACED_TRIAL = 0
-"""The one trial of a condition that may keep every iteration, declared beforehand (FIG5-TRIAL)."""
+"""The trial of each condition that may keep every iteration, fixed in advance (FIG5-TRIAL)."""
 
 
 def compute(
     agent: Agent, wanted: Sequence[tuple[Condition, int]], root: int, *, traced: bool = True
 ) -> list[tuple[str, Trial]]:
-    """Compute trials of conditions that share an agent side by side.
+    """Compute trials of conditions that share an agent, side by side.
 
     Parameters
     ----------
     agent
         The agent of all conditions.
     wanted
-        Conditions, each with the number of a trial.
+        Pairs of a condition and the number of a trial.
     root
-        Root seed: trial k descends from its child k.
+        Root seed; trial k descends from its child k.
     traced
         Whether TRACED_TRIAL keeps its snapshots.
 
     Returns
     -------
     list
-        Each trial with its key, in the order in which they finished.
+        Pairs of a key and a trial, in the order in which the trials finished.
     """
     seeds = trial_seeds(root, max(k for _, k in wanted) + 1)
     loops = [

@@ -32,7 +32,7 @@ def make_agent(environment: Environment, params: Params) -> Agent:
     Raises
     ------
     ChoiceError
-        If there is none for such an environment, or it cannot do what the parameters ask for.
+        If there is no such agent, or it cannot do what the parameters ask for.
     """
     if environment.kind not in AGENTS:
         raise ChoiceError(unknown(environment.kind, AGENTS, "kind of environment"))
@@ -42,7 +42,7 @@ def make_agent(environment: Environment, params: Params) -> Agent:
 
 @dataclass(frozen=True)
 class Condition:
-    """What all trials of one condition have in common.
+    """What all trials of a condition have in common.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class Condition:
     method
         Name in the registry of methods.
     params
-        Everything else that determines a trial but its seed.
+        Everything else that determines a trial, except its seed.
 
     Raises
     ------
     ChoiceError
         If the method is unknown.
     DemoError
-        If the demonstrations have none of a kind that the parameters ask for.
+        If the demonstrations lack a kind that the parameters ask for.
     """
 
     demos: Demos
@@ -66,7 +66,7 @@ class Condition:
     params: Params
 
     def __post_init__(self) -> None:
-        _ = self.selected  # a condition that cannot run is refused when it is made
+        _ = self.selected  # refuses a condition that could not run as soon as it is made
 
     @cached_property
     def selected(self) -> Demos:
@@ -76,7 +76,7 @@ class Condition:
 
     @cached_property
     def selected_hash(self) -> str:
-        """The hash of what the method is given, see :func:`replication.demos.model.content_hash`."""
+        """Hash of what the method is given, see :func:`replication.demos.model.content_hash`."""
         return content_hash(self.selected)
 
     @property
@@ -86,12 +86,12 @@ class Condition:
 
     @property
     def choices(self) -> str:
-        """The registered choices that differ from the defaults: `ID=value`, parted by blanks."""
+        """The registered choices that differ from the defaults: `ID=value`, separated by blanks."""
         return " ".join(f"{id}={value}" for id, value in self.params.differences().items())
 
     @cached_property
     def agent(self) -> Agent:
-        """The learner that the loop is given."""
+        """The agent that learns in the environment."""
         return make_agent(self.demos.environment, self.params)
 
     def trial(

@@ -1,4 +1,4 @@
-"""An agent in a maze: Q-learning (Eq. 1) and greedy episodes on the table of moves."""
+"""The agent in a maze: Q-learning (Eq. 1) and greedy episodes on the table of moves."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class MazeAgent:
     maze: Maze
     learner: Learner
     rollout_ties: str
-    batch_size: int = 25  # enough to keep the compiled learner's lanes busy
+    batch_size: int = 25  # enough to keep all lanes of the compiled learner busy
 
     def __post_init__(self) -> None:
         if self.learner.epsilon_end != self.learner.epsilon:

@@ -1,4 +1,4 @@
-"""An agent in robot soccer: Q-learning (Eq. 1) and greedy episodes in the physics world."""
+"""The agent in robot soccer: Q-learning (Eq. 1) and greedy episodes in the physics world."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Streams = NDArray[np.uint64]
 
 @dataclass(frozen=True)
 class SoccerAgent:
-    """Q-learning (Eq. 1) and greedy episodes in robot soccer; its own time limit is the horizon."""
+    """Q-learning (Eq. 1) and greedy episodes in robot soccer; the time limit is the horizon."""
 
     field: SoccerField
     learner: Learner

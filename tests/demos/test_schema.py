@@ -151,15 +151,15 @@ REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
     ),
     "start": (
         [(("environment", "start"), [1, 0])],
-        "environment: 'start' is [1, 0], but by the map it is [0,0]; write that, or leave it out",
+        "environment: 'start' is [1, 0], but should be [0,0]; write that or leave it out",
     ),
     "goal": (
         [(("environment", "goal"), [1, 1])],
-        "environment: 'goal' is [1, 1], but by the map it is",
+        "environment: 'goal' is [1, 1], but should be",
     ),
     "order of actions": (
         [(("environment", "actions"), ["down", "up", "right", "left"])],
-        "environment: 'actions' is ['down', 'up', 'right', 'left'], but by the map it is [\"up\"",
+        "environment: 'actions' is ['down', 'up', 'right', 'left'], but should be [\"up\"",
     ),
     "action as number": (
         [(("correct", 0, "actions", 1), 1)],

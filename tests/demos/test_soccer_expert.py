@@ -117,3 +117,27 @@ def test_leaving_at_every_decision_gives_more() -> None:
         for params in (SoccerExpert(), SoccerExpert(leave="every"))
     )
     assert legs < every
+
+
+def test_correct_demo_is_short_and_plain(demos: Demos) -> None:
+    """It scores in 15 decisions and 10 s, and slows down once, before one obstacle."""
+    (correct,) = demos.correct
+    actions = correct.actions.tolist()
+    assert len(actions) == 15
+    assert len(set(zip(correct.states.tolist(), actions, strict=False))) == 14
+    assert set(actions) == {FORWARD, SLOW}
+    slow = [i for i, action in enumerate(actions) if action == SLOW]
+    assert slow == list(range(slow[0], slow[0] + 3))
+    world = FastSoccerWorld()
+    for action in actions:
+        world.step(action)
+    assert world.time < 10
+
+
+def test_slowing_down_has_a_reason() -> None:
+    """Driving on at full speed, as the expert would without obstacles, hits one."""
+    world = FastSoccerWorld()
+    for _ in range(15):
+        if world.step(FORWARD)[1]:
+            break
+    assert world.contacts.obstacles > 0

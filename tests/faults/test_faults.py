@@ -805,7 +805,7 @@ def test_a_damaged_store_is_set_aside(
     assert re.search(
         r"trials\.sqlite is damaged \(.*set aside as \S+; .*again\n", capfd.readouterr().err
     )
-    (aside,) = tmp_path.glob("*.damaged-*")
+    (aside,) = tmp_path.glob("*.damaged")
     assert aside.read_bytes() == damaged
     assert _bits(_results(small_demos, path)) == bits
     assert capfd.readouterr().err == ""

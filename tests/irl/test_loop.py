@@ -54,10 +54,10 @@ def _mu_e() -> Array:
 
 
 def _trial(method: str = "unified", *, keep: bool = False, **choices: object) -> Trial:
-    task = Corridor()
+    agent = Corridor()
     mu_b = np.zeros((5, 2), dtype=bool)
     loop = iterate(
-        task,
+        agent,
         get_method(method),
         _mu_e(),
         mu_b,
@@ -65,7 +65,7 @@ def _trial(method: str = "unified", *, keep: bool = False, **choices: object) ->
         seed=np.random.SeedSequence(1),
         keep=keep,
     )
-    ((position, trial),) = run(task, [loop])
+    ((position, trial),) = run(agent, [loop])
     assert position == 0
     return trial
 
@@ -166,9 +166,9 @@ def test_weights_are_the_sum_of_the_updates() -> None:
 @pytest.mark.parametrize(("q_start", "from_zero"), [("reset", True), ("kept", False)])
 def test_q_is_reset_or_kept(q_start: str, from_zero: bool) -> None:
     """Q-START decides what the second learning call starts from."""
-    task = Corridor()
+    agent = Corridor()
     loop = iterate(
-        task,
+        agent,
         get_method("unified"),
         _mu_e(),
         np.zeros((5, 2), dtype=bool),
@@ -203,11 +203,11 @@ def test_random_start_weights_come_from_the_seed() -> None:
 
 
 def test_trials_side_by_side_learn_in_one_call() -> None:
-    """Each iteration of several trials is one call of the task, and each trial comes out alone."""
-    task = Corridor()
+    """Each iteration of several trials is one call of the agent, and each trial comes out alone."""
+    agent = Corridor()
     loops = [
         iterate(
-            task,
+            agent,
             get_method(name),
             _mu_e(),
             np.zeros((5, 2), dtype=bool),
@@ -216,25 +216,25 @@ def test_trials_side_by_side_learn_in_one_call() -> None:
         )
         for name in ("unified", "adaboost")
     ]
-    together = dict(run(task, loops))
+    together = dict(run(agent, loops))
     assert sorted(together) == [0, 1]
-    assert task.calls == max(trial.iterations for trial in together.values())
+    assert agent.calls == max(trial.iterations for trial in together.values())
     for position, name in enumerate(("unified", "adaboost")):
         np.testing.assert_array_equal(together[position].errors, _trial(name).errors)
 
 
 def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     """No error at the first trajectory means zero iterations and no learning."""
-    task = Corridor()
-    episode, _ = task.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
+    agent = Corridor()
+    episode, _ = agent.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
     mu = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
     loop = iterate(
-        task,
+        agent,
         get_method("unified"),
         mu,
         np.zeros((5, 2), dtype=bool),
         Params(),
         seed=np.random.SeedSequence(1),
     )
-    ((_, trial),) = run(task, [loop])
-    assert (trial.iterations, trial.converged, task.calls) == (0, True, 0)
+    ((_, trial),) = run(agent, [loop])
+    assert (trial.iterations, trial.converged, agent.calls) == (0, True, 0)

@@ -29,11 +29,13 @@ def test_compiles_wherever_it_can_or_cannot_write(tmp_path: Path, writable: str)
     home.touch() if writable == "nothing" else home.mkdir()
     environment = {name: value for name, value in os.environ.items() if "CACHE" not in name}
     subprocess.run(
-        [sys.executable, "-c", "import kernel; assert kernel.count_groups(30) == 2"],
+        [sys.executable, "-c", "import compiled; assert compiled.count_groups(30) == 2"],
         cwd=module.parent,
         env=environment | {"HOME": str(home), "XDG_CACHE_HOME": str(home)},
         check=True,
     )
     places = {"package": tmp_path / "__pycache__", "user": home}
-    kept = {name: any(folder.rglob("kernel.count_groups*.nbc")) for name, folder in places.items()}
+    kept = {
+        name: any(folder.rglob("compiled.count_groups*.nbc")) for name, folder in places.items()
+    }
     assert kept == {name: name == writable for name in places}

@@ -10,14 +10,16 @@ from typing import Any
 
 import pytest
 
+from replication.demos.maze_expert import Expert
+from replication.demos.soccer_expert import SoccerExpert
 from replication.envs.soccer.rules import SoccerParams
-from replication.errors import unknown
 from replication.files import PROJECT
 from replication.paper import params
 from replication.paper.register import Choice, ChoiceError, Chosen, load_choices
+from replication.trials.measures import Report
 
 ENTRIES = list(load_choices().values())
-IDS = [one.id for one in ENTRIES]
+IDS = [entry.id for entry in ENTRIES]
 CLASSES = [
     kind
     for _, kind in inspect.getmembers(params, inspect.isclass)
@@ -54,7 +56,7 @@ def test_fields_and_entries_match() -> None:
     """Each field of a parameter dataclass is one entry's field, and the other way round."""
     declared = {
         f"{kind.__name__}.{field.name}": field.metadata.get("choice")
-        for kind in (*CLASSES, SoccerParams)
+        for kind in (*CLASSES, SoccerParams, Expert, SoccerExpert, Report)
         for field in dataclasses.fields(kind)
     }
     assert declared == {entry.field: entry.id for entry in ENTRIES if entry.field}
@@ -128,13 +130,6 @@ def test_ends_of_a_range_belong_to_it() -> None:
     assert [REAL.check(value) for value in (0.0, 1.0)] == [0.0, 1.0]
     with pytest.raises(ChoiceError):
         REAL.check(1.0 + 1e-15)
-
-
-def test_near_miss_is_suggested() -> None:
-    """An unknown name is answered with the nearest known one, and with all of them."""
-    message = unknown("aplha", ["alpha", "beta"], "parameter")
-    assert message == ("unknown parameter 'aplha' (did you mean 'alpha'?); known: alpha, beta")
-    assert "did you mean" not in unknown("xyz", ["alpha", "beta"], "parameter")
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from replication import Demos, Params, load_demos
-from replication.envs.maze import as_maze
+from replication.envs.maze import MazeError, as_maze
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import SoccerParams
 from replication.envs.soccer.world import SoccerWorld
+from replication.errors import UserError
 from replication.files import PROJECT
 from replication.learning.seeds import stream
 from replication.paper.published import SOCCER
 from replication.paper.register import ChoiceError
+from replication.trials import maze_agent, soccer_agent
 from replication.trials.condition import Condition, make_agent
 from replication.trials.maze_agent import MazeAgent
 from replication.trials.soccer_agent import SoccerAgent
@@ -25,12 +29,21 @@ def soccer() -> Demos:
     return load_demos(PROJECT / "data" / "demos" / "soccer.json")
 
 
-def test_each_environment_has_its_task(small_demos: Demos, soccer: Demos) -> None:
-    """A maze makes a maze task, a field a soccer task, anything else an error."""
+def test_each_environment_has_its_agent(small_demos: Demos, soccer: Demos) -> None:
+    """A maze makes a maze agent, a field a soccer agent, another kind an error that lists both."""
     assert isinstance(make_agent(small_demos.environment, Params()), MazeAgent)
     assert isinstance(make_agent(soccer.environment, Params.of(**SOCCER)), SoccerAgent)
-    with pytest.raises(ChoiceError, match="no task for a str"):
-        make_agent("chess", Params())  # type: ignore[arg-type]
+    chess: Any = SimpleNamespace(kind="chess")
+    with pytest.raises(ChoiceError, match="unknown kind of environment 'chess'; known: maze, socc"):
+        make_agent(chess, Params())
+
+
+def test_agents_refuse_the_other_kind_of_environment(small_demos: Demos, soccer: Demos) -> None:
+    """The maze's agent needs a maze and the soccer agent a field: else one line says so."""
+    with pytest.raises(MazeError, match=r"a maze is needed here, .* of kind 'soccer'"):
+        maze_agent.make_agent(soccer.environment, Params())
+    with pytest.raises(UserError, match=r"robot soccer is needed here, .* of kind 'maze'"):
+        soccer_agent.make_agent(small_demos.environment, Params())
 
 
 def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
@@ -42,12 +55,12 @@ def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
 def test_hits_in_mazes_are_the_moves_that_change_nothing(stored_demos: Demos) -> None:
     """A maze's episode moves by the table, and hits something just where it stays in place."""
     maze = as_maze(stored_demos.environment)
-    task = make_agent(maze, Params.of(horizon=60))
+    agent = make_agent(maze, Params.of(horizon=60))
     rng = np.random.default_rng(1)
     seen: set[bool] = set()
     for seed in range(20):
-        q = rng.integers(0, 3, size=task.shape).astype(float)
-        episode, _ = task.roll_out(q, stream(np.random.SeedSequence(seed)))
+        q = rng.integers(0, 3, size=agent.shape).astype(float)
+        episode, _ = agent.roll_out(q, stream(np.random.SeedSequence(seed)))
         moves = zip(episode.states.tolist(), episode.actions.tolist(), strict=False)
         there = [int(maze.next_state[state, action]) for state, action in moves]
         assert episode.states[1:].tolist() == there
@@ -64,12 +77,12 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: st
     """Where the plain world, given an episode's actions, counts more contacts, there is a hit."""
     assert isinstance(soccer.environment, SoccerField)
     field = replace(soccer.environment, params=SoccerParams(macro=macro, time_limit=60.0))
-    task = make_agent(field, Params.of(**SOCCER))
+    agent = make_agent(field, Params.of(**SOCCER))
     world = SoccerWorld(field.params)
     seen: set[bool] = set()
     for seed in range(4):
-        q = np.random.default_rng(seed).integers(0, 3, size=task.shape).astype(float)
-        episode, _ = task.roll_out(q, stream(np.random.SeedSequence(seed)))
+        q = np.random.default_rng(seed).integers(0, 3, size=agent.shape).astype(float)
+        episode, _ = agent.roll_out(q, stream(np.random.SeedSequence(seed)))
         states, touched = [world.reset()], []
         for action in episode.actions.tolist():
             before = world.contacts
@@ -84,13 +97,13 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: st
 def test_soccer_trials_do_not_depend_on_each_other(soccer: Demos) -> None:
     """Two trials learned in one call have the bits of each learned alone."""
     params = Params.of(**{**SOCCER, "episodes": 3})
-    task = make_agent(soccer.environment, params)
+    agent = make_agent(soccer.environment, params)
     rng = np.random.default_rng(1)
-    weights, q = rng.normal(size=(2, *task.shape)), np.zeros((2, *task.shape))
+    weights, q = rng.normal(size=(2, *agent.shape)), np.zeros((2, *agent.shape))
     streams = np.stack([stream(np.random.SeedSequence(k)) for k in range(2)])
-    together = task.learn(weights, q, streams)
+    together = agent.learn(weights, q, streams)
     for k in range(2):
-        alone = task.learn(weights[k : k + 1], q[k : k + 1], streams[k : k + 1])
+        alone = agent.learn(weights[k : k + 1], q[k : k + 1], streams[k : k + 1])
         for one, other in zip(alone, together, strict=True):
             np.testing.assert_array_equal(one[0], other[k])
 

@@ -1,15 +1,21 @@
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
-from replication import Demos, source
+from replication import Demos, load_demos
+from replication.files import PROJECT
 from replication.irl import METHODS, Trial
 from replication.paper.params import Params
 from replication.paper.register import load_choices
@@ -17,6 +23,7 @@ from replication.trials import compute
 from replication.trials.compute import TRACED_TRIAL, trial_key
 from replication.trials.condition import Condition
 
+PACKAGE = PROJECT / "replication"
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
 
 
@@ -24,6 +31,12 @@ FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
 def condition(small_demos: Demos) -> Condition:
     """Return a condition that uses incorrect demonstrations."""
     return Condition(small_demos, "unified-incorrect", Params.of(**FEW, incorrect="all"))
+
+
+@pytest.fixture(scope="module")
+def soccer_demos() -> Demos:
+    """Load the stored demonstrations of soccer, where every parameter may be chosen."""
+    return load_demos(PROJECT / "data" / "demos" / "soccer.json")
 
 
 def other_value(id: str) -> Any:
@@ -48,9 +61,9 @@ def test_every_parameter_is_tried() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(PARAMETERS) - {"incorrect"}))
-def test_every_parameter_gives_another_key(small_demos: Demos, name: str) -> None:
+def test_every_parameter_gives_another_key(soccer_demos: Demos, name: str) -> None:
     """Each parameter of a trial is part of its key."""
-    default = Condition(small_demos, "unified-incorrect", Params.of(incorrect="all"))
+    default = Condition(soccer_demos, "unified-incorrect", Params.of(incorrect="all"))
     params = Params.of(incorrect="all", **{name: other_value(PARAMETERS[name])})
     assert params != default.params
     assert trial_key(replace(default, params=params), 1, 0) != trial_key(default, 1, 0)
@@ -66,7 +79,7 @@ def test_method_demos_and_seed_give_another_key(condition: Condition) -> None:
         replace(condition, demos=replace(demos, correct=(*demos.correct, twin))),
         replace(condition, demos=replace(demos, incorrect=demos.incorrect[1:])),
     ]
-    keys = [trial_key(one, 1, 3) for one in (condition, *others)]
+    keys = [trial_key(each, 1, 3) for each in (condition, *others)]
     keys += [trial_key(condition, 1, 4), trial_key(condition, 2, 3)]
     assert len(set(keys)) == len(keys)
 
@@ -83,7 +96,7 @@ def test_traced_trials_have_a_key_of_their_own(condition: Condition) -> None:
 @pytest.mark.parametrize(
     ("owner", "name", "value"),
     [
-        (compute, "source_hash", lambda _: "other"),
+        (compute, "source_hash", lambda *_: "other"),
         (numba, "__version__", "0"),
         (np, "__version__", "0"),
     ],
@@ -118,38 +131,135 @@ def test_key_is_the_same_in_another_process(condition: Condition) -> None:
     assert set(trial_key(condition, 1, 0)) <= set("0123456789abcdef")
 
 
-def test_source_of_a_trial_is_what_computes_it() -> None:
-    """The hash covers learning, tasks and updates, and not what schedules, stores or draws."""
-    covered = source.module_hashes(["replication.trials.compute"])
-    for name in ("compute", "irl", "irl.loop", "irl.unified", "irl.adaboost", "tasks", "kernel"):
-        assert f"replication.{name}" in covered
-    for name in ("qlearning", "expectations", "setting", "params", "seeds", "demos", "envs.maze"):
-        assert f"replication.{name}" in covered
-    for name in (
-        *("store", "trials", "progress", "figures", "panels", "tables", "notebooks", "cli"),
-        *("regenerate", "execution", "provenance", "status", "verification", "statistics"),
-    ):
-        assert find_spec(f"replication.{name}") is not None
-        assert f"replication.{name}" not in covered
+# What of the package's code is in a key, for each task, by the modules that stand for it.
+BOTH = [
+    *("trials.compute", "trials.condition", "demos.model", "envs.environment"),
+    *("irl.agent", "irl.expectations", "irl.loop", "paper.params", "paper.register"),
+    *("learning", "learning.seeds", "learning.compiled"),
+]
+MAZE = ["envs.maze", "learning.qlearning", "trials.maze_agent"]
+SOCCER = [
+    *("envs.soccer", "envs.soccer.rules", "envs.soccer.world", "envs.soccer.compiled"),
+    *("envs.soccer.field", "learning.soccer", "trials.soccer_agent"),
+]
+UPDATES = ["irl.unified", "irl.adaboost"]
+
+# Edits a copy of the package and prints, for each edit, the keys of one trial of each kind.
+KEYS = """
+import ast, json, sys
+from pathlib import Path
+from replication import load_demos
+from replication.paper.params import Params
+from replication.source import source_hash
+from replication.trials.compute import trial_key
+from replication.trials.condition import Condition
+
+package, edits, data = Path(sys.argv[1]), json.loads(sys.argv[2]), Path(sys.argv[3])
+conditions = [
+    Condition(load_demos(data / f"{name}.json"), method, Params())
+    for name, method in (("open_maze", "unified"), ("soccer", "adaboost"))
+]
+
+def reworded(text):
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            node.exc.args = [ast.Constant("other words")]
+        if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
+            node.value.value = "Other words."
+    return ast.unparse(tree)
+
+def changed(text, how):
+    return reworded(text) if how == "reword" else text + how
+
+keys = {}
+for name, (modules, how) in edits.items():
+    before = {package / module: (package / module).read_bytes() for module in modules}
+    for path, content in before.items():
+        path.write_text(changed(content.decode(), how), encoding="utf-8")
+    source_hash.cache_clear()
+    keys[name] = [trial_key(condition, 1, 0) for condition in conditions]
+    for path, content in before.items():
+        path.write_bytes(content)
+print(json.dumps(keys))
+"""
+
+Keys = dict[str, list[str]]
 
 
-def test_trials_come_with_their_keys_and_own_bits(condition: Condition) -> None:
+def module_file(name: str) -> str:
+    """Return the file of a module, relative to the package's folder."""
+    path = name.replace(".", "/")
+    folder = (PACKAGE / path).is_dir()
+    return f"{path}/__init__.py" if folder else f"{path}.py"
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Keys:
+    """Keys of a trial in a maze (unified) and in soccer (AdaBoost-IRL), by edits of the code."""
+    root = tmp_path_factory.mktemp("copy")
+    ignored = shutil.ignore_patterns("__pycache__")
+    package = Path(shutil.copytree(PACKAGE, root / "replication", ignore=ignored))
+    computing = {module_file(name) for name in BOTH + MAZE + SOCCER + UPDATES}
+    others = {path.relative_to(package).as_posix() for path in package.rglob("*.py")} - computing
+    code = "\n\ndef added():\n    return 1\n"
+    edits = {
+        "nothing": ([], ""),
+        "other modules": (sorted(others), code),
+        "words": (sorted(computing | others), "reword"),
+        "comments": (sorted(computing | others), "\n# A comment.\n"),
+        "method": (["irl/methods.py"], "\nMETHODS['new'] = METHODS['unified']\n"),
+    } | {name: ([module_file(name)], code) for name in BOTH + MAZE + SOCCER + UPDATES}
+    done = subprocess.run(
+        [sys.executable, "-c", KEYS, str(package), json.dumps(edits), str(PROJECT / "data/demos")],
+        env=os.environ | {"PYTHONPATH": str(root)},
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    keys: Keys = json.loads(done.stdout)
+    return keys
+
+
+@pytest.mark.parametrize("edit", ["other modules", "words", "comments", "method"])
+def test_what_does_not_compute_changes_no_key(keys: Keys, edit: str) -> None:
+    """Other modules' code, any docstring or error message, comments and a new method do not count.
+
+    Among the other modules are those that read files, check, report, run notebooks and make pages.
+    """
+    assert keys[edit] == keys["nothing"]
+    assert len(set(keys["nothing"])) == 2
+
+
+@pytest.mark.parametrize("module", BOTH + MAZE + SOCCER + UPDATES)
+def test_what_computes_changes_the_keys_of_its_trials(keys: Keys, module: str) -> None:
+    """Code that only a maze, only soccer or only one method runs changes no other trial's key."""
+    maze, soccer = (
+        now != before for now, before in zip(keys[module], keys["nothing"], strict=True)
+    )
+    assert maze == (module not in (*SOCCER, "irl.adaboost"))
+    assert soccer == (module not in (*MAZE, "irl.unified"))
+
+
+def test_trials_come_with_their_keys_and_bits(condition: Condition) -> None:
     """Side by side or alone, in any order, a trial has the same bits under the same key."""
     wanted = [(condition, 2), (replace(condition, method="unified"), 0), (condition, 0)]
     together = dict(compute.compute(condition.agent, wanted, 7))
-    assert set(together) == {trial_key(one, 7, k) for one, k in wanted}
-    for one in wanted:
-        ((key, alone),) = compute.compute(condition.agent, [one], 7)
+    assert set(together) == {trial_key(each, 7, k) for each, k in wanted}
+    for each in wanted:
+        ((key, alone),) = compute.compute(condition.agent, [each], 7)
         assert bits(together[key]) == bits(alone)
 
 
 @pytest.mark.parametrize("traced", [True, False])
 def test_only_the_traced_trial_keeps_snapshots(condition: Condition, traced: bool) -> None:
     """The declared trial keeps every iteration, if asked for; its result is the same without."""
-    found = dict(
+    trials = dict(
         compute.compute(condition.agent, [(condition, 0), (condition, 1)], 7, traced=traced)
     )
-    first, second = (found[trial_key(condition, 7, k, traced=traced)] for k in (0, 1))
+    first, second = (trials[trial_key(condition, 7, k, traced=traced)] for k in (0, 1))
     assert (first.snapshots is not None) == traced
     assert second.snapshots is None
     plain: Callable[..., list[tuple[str, Trial]]] = compute.compute

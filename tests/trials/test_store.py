@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-import pickle
 import signal
 import sqlite3
 import subprocess
 import sys
 import threading
+import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -27,8 +27,8 @@ CHILD = """
 import os, sys
 import numpy as np
 from replication.irl import Trial
-from replication.store import Store
-from replication.tasks import Episode
+from replication.irl.agent import Episode
+from replication.trials.store import Store
 
 def batch(b, value):
     table, few = np.full((100, 4), float(value)), np.arange(2)
@@ -188,7 +188,7 @@ def test_other_threads_may_read_and_write(store_path: Path) -> None:
 
 
 def test_a_damaged_trial_is_never_taken_for_a_good_one(store_path: Path) -> None:
-    """Whichever bit of a record is wrong, or missing, it is told or does not matter."""
+    """Whichever bit of a record is wrong, or missing, is an error or does not matter."""
     store = Store(store_path)
     store.put([("a", trial([1.0, 2.0], 1)), ("b", trial([3.0], 1))])
     connection = sqlite3.connect(store_path)
@@ -199,56 +199,99 @@ def test_a_damaged_trial_is_never_taken_for_a_good_one(store_path: Path) -> None
         for at in range(len(record))
         for bit in (1, 16, 128)
     ]
-    told = 0
+    refused = 0
     for damage in damages:
         connection.execute("UPDATE trials SET record = ? WHERE key = 'a'", (damage,))
         connection.commit()
         try:
             assert_same(store.get("a"), trial([1.0, 2.0], 1))  # a bit that fills the last byte
         except DamagedTrialError:
-            told += 1
+            refused += 1
     connection.close()
-    assert told > 0.95 * len(damages)
+    assert refused > 0.95 * len(damages)
     store.drop("a")
     assert "a" not in store
     store.put([("a", trial([4.0], 1))])
     assert [store.get(key).errors.tolist() for key in "ab"] == [[4.0], [3.0]]
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(b"", b"\xb8", b"[1, 2]", b"{", b"[" * 100_000, b'{"errors": 1}', b'{"errors": []}'),
+        *(
+            b'{"errors": ["%s", [%s]]}\n' % (kind, length)
+            for kind, length in [
+                (b"<f8", b"9"),
+                (b"<f8", b"-1"),
+                (b"<f8", b"1" * 99),
+                (b"<f8", b'"a"'),
+                (b"|O", b"1"),
+                (b"x", b"1"),
+                (b"<f8", b"1e9"),
+                (b"<f8", b"null"),
+            ]
+        ),
+        b'{"lengths": ["<i8", [0]]}\n',
+    ],
+)
+@pytest.mark.parametrize("compressed", [True, False])
+def test_any_bytes_of_a_record_are_an_error_of_ours(
+    store_path: Path, content: bytes, compressed: bool
+) -> None:
+    """What is no record of a trial, however it fails, is a damaged trial and nothing else."""
+    store = Store(store_path)
+    store.put([("a", trial([1.0, 2.0], 1, kept=2))])
+    packed = zlib.compress(content) if compressed else content
+    for column, snapshots in (("snapshots", True), ("record", False)):
+        with sqlite3.connect(store_path) as connection:
+            connection.execute(f"UPDATE trials SET {column} = ?", (packed,))
+        connection.close()
+        with pytest.raises(DamagedTrialError, match="trial a is damaged") as caught:
+            store.get("a", snapshots=snapshots)
+        assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("content", [b"no database, but as long as its header" * 9, b"\1" * 99])
 def test_a_damaged_file_is_set_aside(
     store_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A file that is no store is kept under another name, told, and a new one begun."""
+    """A file that is no store is renamed, with a message, and a new one begun; the last is kept."""
     store_path.parent.mkdir()
-    for number in (1, 2):
-        store_path.write_bytes(content)
+    for more in (b"", b"more"):
+        store_path.write_bytes(content + more)
         store = Store(store_path)
         store.put([("a", trial([1.0], 1))])
         assert "a" in store
         store._connection.close()
-        aside = store_path.with_name(f"trials.sqlite.damaged-{number}")
-        assert aside.read_bytes() == content
+        aside = store_path.with_name("trials.sqlite.damaged")
+        assert aside.read_bytes() == content + more
         assert f"set aside as {aside.name}" in capsys.readouterr().err
+    assert len(list(store_path.parent.glob("*.damaged*"))) == 1
 
 
 def test_a_store_that_cannot_be_used_is_an_error(tmp_path: Path) -> None:
-    """A folder in the place of the file is told, and not set aside."""
+    """A folder in the place of the file is an error, and not set aside."""
     with pytest.raises(OSError, match="the store cannot be used"):
         Store(tmp_path)
     assert tmp_path.is_dir()
 
 
-def test_one_store_serves_threads(store_path: Path) -> None:
-    """Each thread has a connection of its own, and so has a copy."""
+def test_a_store_belongs_to_its_thread(store_path: Path) -> None:
+    """Another thread that uses this thread's store is stopped; it has to open its own."""
     store = Store(store_path)
-    store.put([("a", trial([1.0], 1))])
-    found: list[bool] = []
-    thread = threading.Thread(target=lambda: found.append("a" in store))
+    errors: list[Exception] = []
+
+    def use() -> None:
+        try:
+            store.known(["a"])
+        except sqlite3.ProgrammingError as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=use)
     thread.start()
     thread.join()
-    assert found == [True]
-    assert "a" in pickle.loads(pickle.dumps(store))
+    assert len(errors) == 1
 
 
 def child(program: str, path: Path) -> subprocess.Popen[str]:

@@ -1,16 +1,19 @@
-"""Robot soccer, compiled: the bits of `replication.envs.soccer.rules`, many times faster.
+"""Robot soccer, compiled: the bits of :mod:`replication.envs.soccer.world`, many times faster.
 
-Read that module first. Two things make the difference:
+Read `rules.py` and `world.py` first. Two things make the difference:
 
 - **A decision in which nothing can touch needs no engine.** `_glide` computes each tick of the
-  robot with the operations that the engine would use, and gives up where two bodies come close.
+  robot with the operations that the engine would use, and gives up when two bodies come close.
 - **Where bodies may touch, the engine is called without Python.** `_collide` calls the C functions
-  within pymunk by their addresses. It makes one space as good as new: it takes out what moves,
-  lets a tick pass so that the engine forgets, and puts everything back as in a new space.
+  within pymunk by their addresses. It reuses one space, which it makes as good as new: it takes out
+  what moves, lets a tick pass so that the engine forgets, and puts everything back.
 
-Those functions, whose arguments are pointers and numbers only, are private to pymunk and may change
-with its version: all that depends on them is `_FUNCTIONS` and `engine`, and the tests compare each
-bit with the public interface.
+Those functions take pointers and numbers only; they are private to pymunk and may change with its
+version. Only `_FUNCTIONS` and `engine` depend on them, and the tests compare every bit with the
+public interface.
+
+This is one file because numba renews its cache on disk only when the file of the cached function
+changes: a compiled function must not call what is compiled from another file.
 """
 
 # Numba infers the types of compiled functions, and llvmlite has none.
@@ -45,9 +48,8 @@ _TICK, _OBSTACLES, _WALLS = range(N_INTS)
 class Law(NamedTuple):
     """All numbers that the compiled functions use, of the field and of the parameters.
 
-    They are arguments, not constants: numba would not notice if another file's constant changes.
-    They are tuples, not arrays: those are counted whenever they are passed on, which takes longer
-    than the rest.
+    They are arguments, not constants, as numba would not notice a changed constant of another file.
+    They are tuples, not arrays, whose reference counting would take longer than all the rest.
     """
 
     width: float
@@ -126,7 +128,7 @@ class Law(NamedTuple):
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function, and keep the result on disk if there is a writable place for it."""
+    """Compile a function, and cache the result on disk if there is a writable place for it."""
     try:
         return njit(cache=True)(function)
     except RuntimeError:  # neither the package's folder nor the user's can be written
@@ -217,9 +219,9 @@ def _inside(law, x, y, radius):
 
 @_compiled
 def _glide(law, turn_ticks, rate, speed, now, clock):
-    """Make a decision in which nothing touches, or return False and leave everything as it was.
+    """Carry out a decision without contacts, or return False and leave everything unchanged.
 
-    The engine looks for contacts once a tick, at the bodies' new places, and so does this.
+    Like the engine, this looks for contacts once a tick, at the bodies' new places.
     """
     if now[5] != 0.0 or now[6] != 0.0:
         return False
@@ -269,7 +271,7 @@ def _address(pointer: Any) -> int:
 
 
 def _function(name: str) -> Any:
-    """Make a C function within pymunk known to compiled functions, by name: so they can be kept."""
+    """Make a C function of pymunk known by name to compiled functions, which then can be cached."""
     binding.add_symbol(name, _address(ffi.addressof(lib, name)))
     return types.ExternalFunction(name, _FUNCTIONS[name])
 
@@ -283,7 +285,7 @@ _set_next_id = _function("cpSpaceSetShapeIDCounter")
 
 
 class Batch(NamedTuple):
-    """A table that the engine fills, or reads, with some fields of all bodies (or contacts)."""
+    """A table of some fields of all bodies (or contacts) that the engine fills or reads."""
 
     function: int  # address of what the engine calls for each of them
     request: int  # address of the structure that describes the table
@@ -352,8 +354,8 @@ def _exchange(space, batch):
 def _renew(engine, law, now, tick):
     """Put everything in its place, and make the space as good as new.
 
-    Taking a shape out drops its contacts, and taking all out empties the tree that finds them; the
-    tick that passes in between uses up the corrections of positions that bodies carry over.
+    Removing a shape drops its contacts, and removing all empties the tree that finds them; the tick
+    in between uses up the corrections of positions that bodies carry over.
     """
     space = engine.space
     for shape in engine.shapes:
@@ -374,7 +376,7 @@ def _renew(engine, law, now, tick):
 
 @_compiled
 def _collide(engine, law, turn_ticks, rate, speed, now, clock):
-    """Make a decision in which bodies may touch, and return whether a goal fell."""
+    """Carry out a decision in which bodies may touch; return whether a goal was scored."""
     space, body, move = engine.space, engine.read.table, engine.move.table
     _renew(engine, law, now, clock[_TICK])
     _exchange(space, engine.read)
@@ -408,7 +410,7 @@ def _collide(engine, law, turn_ticks, rate, speed, now, clock):
 
 @_compiled
 def _touches(engine):
-    """Return whether the robot touches an obstacle, and a wall, or did so in the last few ticks."""
+    """Return whether the robot touches an obstacle, and a wall, or did in the last few ticks."""
     batch, robot, ball = engine.touching, engine.bodies[0], engine.bodies[1]
     batch.used[0] = 0
     _each_arbiter(engine.space, batch.function, batch.request)

@@ -1,4 +1,4 @@
-"""The soccer field as demonstrations see it: actions lead to states, and at last to a goal."""
+"""The soccer field as demonstrations see it: actions lead to states, and in the end to a goal."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from replication.errors import UserError
 
 @dataclass(frozen=True)
 class SoccerField:
-    """Robot soccer with given parameters; states and actions are those of the world."""
+    """Robot soccer with given parameters; its states and actions are those of the world."""
 
     params: SoccerParams = field(default_factory=SoccerParams)
 
     @property
     def kind(self) -> str:
-        """What kind of environment this is."""
+        """Kind of environment: "soccer"."""
         return "soccer"
 
     @property
@@ -42,20 +42,20 @@ class SoccerField:
         return ACTIONS
 
     def replay(self, actions: Iterable[int]) -> NDArray[np.int64]:
-        """States that actions visit: int64 [T + 1]; after the end the last one, again and again."""
+        """Return the states that T actions visit, int64 [T + 1]; after the end, the last one."""
         return self._play(actions)[0]
 
     def goal_step(self, actions: Iterable[int]) -> int | None:
-        """After how many of the actions a goal falls; None if none does."""
+        """Return how many of the actions it takes to score; None if they do not."""
         return self._play(actions)[1]
 
     def cell(self, state: int) -> tuple[int, ...]:
-        """Column and row of a state, from the lower left, and 1 if an obstacle is detected."""
+        """Return a state's column, row (from the lower left), and 1 if an obstacle is detected."""
         column, row, detected = decode(int(state))
         return column, row, int(detected)
 
     def cells(self, states: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Column, row and detection of states, [state, 3]."""
+        """Return column, row and detection of states, int64 [state, 3]."""
         return np.array([self.cell(state) for state in states], dtype=np.int64).reshape(-1, 3)
 
     def describe(self) -> dict[str, Any]:
@@ -76,13 +76,7 @@ class SoccerField:
 
 
 def as_soccer(environment: Environment) -> SoccerField:
-    """Return an environment that has to be the soccer field.
-
-    Raises
-    ------
-    UserError
-        If it is of another kind.
-    """
+    """Return the environment if it is a soccer field; raises `UserError` if it is not."""
     if not isinstance(environment, SoccerField):
         raise UserError(
             f"robot soccer is needed here, but this environment is of kind {environment.kind!r}"

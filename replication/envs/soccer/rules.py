@@ -1,20 +1,21 @@
 """Robot soccer: the field, the robots and what a decision does.
 
-The paper (section IV-C) shows a picture of the task and names its size, its states and its actions;
-the rest is ours and stands here. Units are metres, seconds, kilograms and radians; the origin is
-the lower left corner of the field, x points to the gate, angles are counter-clockwise.
+The paper (section IV-C) shows a picture of the task and gives its size, its states and its actions;
+the rest is our choice and is defined here, in one file because the numbers depend on each other.
+Units are metres, seconds, kilograms and radians; the origin is the lower left corner of the field,
+x points to the gate, angles are counter-clockwise.
 
-`world.py` moves the bodies with pymunk, by the definition; `compiled.py` returns the same bits many
-times faster.
+`world.py` moves the bodies with pymunk and is the definition; `compiled.py` returns the same bits
+many times faster.
 
 **All that outlives a decision is explicit**: the pose of the robot, the position and velocity of
-the ball, and the time, of which the obstacles' poses are a function. Between decisions the robot is
-at rest. A physics engine hides more (cached contact forces, the order in which it finds contacts);
-since each decision starts from a new space, none of it can leak from one decision or episode into
-another, and a decision in which nothing can touch needs no engine at all.
+the ball, and the time, which determines the obstacles' poses. Between decisions the robot is at
+rest. A physics engine hides more state (cached contact forces, the order of contacts). As each
+decision starts from a new space, none of it can leak into another decision or episode, and a
+decision in which nothing can touch needs no engine at all.
 
 **A decision** is a plan for whole ticks: turn in place, then drive straight, then stop. The wheels
-are a servo: each tick they push with the force that would reach the planned velocity by the end of
+are a servo: in each tick they apply the force that would reach the planned velocity by the end of
 the tick, up to what the tyres transmit, so a robot against a wall pushes but does not get through.
 As the engine moves bodies before it changes their velocities, a plan of n ticks takes n + 1.
 """
@@ -34,11 +35,11 @@ ACTIONS = ("forward", "backward", "right", "left", "slow")
 FORWARD, BACKWARD, RIGHT, LEFT, SLOW = range(5)
 ASIDE = (0.0, 0.0, -math.pi / 2, math.pi / 2, 0.0)  # where an action heads, from the ball's bearing
 
-# The field. Corners are cut so that the ball cannot come to lie where no robot can get behind it.
+# The field. Corners are cut so that the ball cannot stop where no robot can get behind it.
 WALL_RADIUS = 0.01
 CORNER = 0.08
 GATE = (0.40, 0.80)  # from, to: the opening in the right wall
-MOUTH = 0.02  # how far behind the line robots can get
+MOUTH = 0.02  # how far robots can get behind the line
 GOAL_X = WIDTH + 0.0213  # of the ball's centre: the whole ball is over the line
 
 # The bodies.
@@ -57,7 +58,7 @@ ITERATIONS = 10
 
 
 class Path(NamedTuple):
-    """An obstacle's way back and forth; its heading stays 0."""
+    """The path on which an obstacle moves back and forth; its heading stays 0."""
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -65,10 +66,10 @@ class Path(NamedTuple):
     phase: float  # where in the cycle it is at time 0; 0 at the start, 0.5 at the end
 
 
-# No path comes closer to a wall than a robot is wide: an obstacle gives way to nothing. The phases
-# and the robot's start are those, of a coarse grid, for which the expert (`expert_action`) scores
-# without a contact, slows down before one obstacle only and stays 1 mm off the borders between
-# cells, so that rounding cannot change its states; driving on at full speed hits that obstacle.
+# No path comes closer to a wall than a robot is wide, as an obstacle never gives way. The phases
+# and the robot's start were taken from a coarse grid so that the expert (`expert_action`) scores
+# without a contact, slows down before one obstacle only (which it would hit at full speed), and
+# stays 1 mm off the borders between cells, where rounding could change its states.
 PATHS = (
     Path((0.62, 0.15), (0.62, 0.85), 0.10, 0.045),
     Path((0.35, 1.00), (1.05, 1.00), 0.10, 0.300),
@@ -86,11 +87,11 @@ class SoccerParams(Chosen):
     Parameters
     ----------
     drive_time
-        Time for which a decision drives, in s, after turning and without the tick to get going.
+        Time for which a decision drives, in s, after turning and without the tick to start moving.
     speed, slow_speed
         Speed of driving, in m/s, in general and of the action "slow".
     turn_rate
-        Greatest rate of turning in place, in rad/s.
+        Maximum rate of turning in place, in rad/s.
     rays, ray_length, ray_arc
         Number of infrared rays; their length from the robot's centre in m; and the arc, in degrees,
         over which they are spread evenly around the heading.
@@ -99,7 +100,7 @@ class SoccerParams(Chosen):
     macro
         Whether an action lasts for one "decision" or until the robot is in another "cell".
     time_limit
-        Simulated time after which an episode ends, in s, at the end of a decision.
+        Simulated time, in s, after which an episode ends, once the current decision is over.
 
     Raises
     ------
@@ -138,7 +139,7 @@ class SoccerParams(Chosen):
 
     @property
     def limit_ticks(self) -> int:
-        """Number of ticks from which an episode is over."""
+        """Number of ticks after which an episode is over."""
         return round(self.time_limit / self.dt)
 
     @property
@@ -184,7 +185,7 @@ def decode(state: int) -> tuple[int, int, bool]:
 
 
 def border_distance(x: float, y: float) -> float:
-    """Return how far a position is from the nearest border between two cells.
+    """Return the distance of a position from the nearest border between two cells.
 
     Examples
     --------
@@ -202,12 +203,12 @@ def border_distance(x: float, y: float) -> float:
 
 
 def expert_action(state: int) -> int:
-    """Return what the expert does: drive to the ball, more slowly if an obstacle is detected."""
+    """Return the expert's action: drive to the ball, more slowly if an obstacle is detected."""
     return SLOW if decode(state)[2] else FORWARD
 
 
 def half_ticks(path: Path, dt: float) -> int:
-    """Return for how many ticks an obstacle moves before it turns round."""
+    """Return the number of ticks for which an obstacle moves before it turns round."""
     return round(math.dist(path.start, path.end) / (path.speed * dt))
 
 
@@ -252,8 +253,8 @@ def servo(
 ) -> tuple[float, float, float]:
     """Return the force x, y and the torque of the wheels for one tick.
 
-    They aim at the planned speed, along the heading at the end of the tick, and the planned rate of
-    turning; wheels that roll also resist being pushed sideways.
+    They aim at the planned speed along the heading at the end of the tick, and at the planned rate
+    of turning; rolling wheels also resist being pushed sideways.
     """
     heading += angular_velocity * dt
     force_x = ROBOT_MASS * (speed * math.cos(heading) - velocity[0]) / dt

@@ -1,6 +1,6 @@
-"""The soccer field as a physics world, in plain pymunk: the definition, written for reading.
+"""Robot soccer as a physics world in plain pymunk: the definition, written to be read.
 
-It builds a new pymunk space for every decision. :mod:`replication.envs.soccer.compiled` returns the
+A new pymunk space is built for every decision. :mod:`replication.envs.soccer.compiled` returns the
 same bits many times faster.
 """
 
@@ -77,6 +77,7 @@ class SoccerWorld:
 
     Examples
     --------
+    >>> from replication.envs.soccer.rules import FORWARD, decode
     >>> world = SoccerWorld()
     >>> decode(world.reset())
     (1, 2, False)
@@ -94,7 +95,7 @@ class SoccerWorld:
         self.reset()
 
     def reset(self) -> int:
-        """Put everything in its place and return the state."""
+        """Put everything in its starting place and return the state."""
         x, y = ROBOT_START
         self.pose = (x, y, math.atan2(BALL_START[1] - y, BALL_START[0] - x))
         self.ball: tuple[float, float] = BALL_START
@@ -131,7 +132,7 @@ class SoccerWorld:
         return [(*obstacle(path, self.tick, self.params.dt)[:2], 0.0) for path in PATHS]
 
     def rays(self) -> list[float]:
-        """How far each ray gets: its distance to the first obstacle, or its whole length."""
+        """Return how far each ray gets: to the nearest obstacle, or its whole length."""
         space = pymunk.Space()
         for x, y, _ in self.obstacles:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -185,7 +186,7 @@ class SoccerWorld:
         return scored
 
     def build_space(self) -> tuple[pymunk.Space, pymunk.Body, pymunk.Body, list[pymunk.Body]]:
-        """Build a space with everything where it is now; bodies and shapes in a fixed order."""
+        """Build a space with everything where it is now, bodies and shapes in a fixed order."""
         space = pymunk.Space()
         space.collision_slop, space.iterations = SLOP, ITERATIONS
         for segment in wall_segments(space.static_body):
@@ -220,7 +221,7 @@ def circle(body: pymunk.Body) -> pymunk.Circle:
 
 
 def wall_segments(body: pymunk.Body) -> list[pymunk.Segment]:
-    """Return the walls, open at the gate, and what stops robots in the gate."""
+    """Return the walls, which are open at the gate, and the barrier that stops robots there."""
     shift = WALL_RADIUS * math.sqrt(2)
     left, right, bottom, top = -WALL_RADIUS, WIDTH + WALL_RADIUS, -WALL_RADIUS, HEIGHT + WALL_RADIUS
     near = CORNER - shift + WALL_RADIUS  # where the lines inside the cut corners meet the walls'

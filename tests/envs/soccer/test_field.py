@@ -61,7 +61,7 @@ def test_demos_survive_their_file() -> None:
     ],
 )
 def test_bad_world_is_refused_in_one_line(change: dict[str, object], message: str) -> None:
-    """A value that is not registered, or a misspelt field, is named together with the mend."""
+    """A value that is not registered, or a misspelt field, is named with how to fix it."""
     document = demos_document(demonstrate_soccer("s"))
     document["environment"] |= change
     with pytest.raises(DemoError) as caught:

@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from replication.demos.soccer_expert import demonstrate_soccer
+from replication.envs.soccer.compiled import FastSoccerWorld
+from replication.envs.soccer.rules import FORWARD, SoccerParams
+from replication.learning import reference, soccer
+from replication.learning.seeds import stream
+
+SCRIPT = """
+import numpy as np
+from replication.envs.soccer.rules import SoccerParams
+from replication.learning.soccer import learn_trial
+q, words, n = learn_trial(SoccerParams(time_limit=100.0), np.eye(384, 5), np.zeros((384, 5)),
+    np.arange(1, 5, dtype=np.uint64), episodes=8, beta=0.6, gamma=0.9, epsilon_start=0.3,
+    epsilon_end=0.05)
+print(q.tobytes().hex(), words, n)
+"""
+
+Expert = tuple[list[tuple[int, int]], NDArray[np.float64], FastSoccerWorld]
+
+
+@pytest.fixture(scope="module")
+def expert() -> Expert:
+    """Return the expert's pairs, a Q that prefers them, and the world after the last of them."""
+    (correct,) = demonstrate_soccer("s").correct
+    pairs = list(zip(correct.states.tolist(), correct.actions.tolist(), strict=False))
+    q, world = np.zeros((384, 5)), FastSoccerWorld()
+    for state, action in pairs:
+        q[state, action] = 1.0
+        world.step(action)
+    return pairs, q, world
+
+
+def learn_plainly(
+    params: SoccerParams, weights: Any, q: Any, stream: list[int], options: dict[str, Any]
+) -> tuple[Any, list[int], int]:
+    """Learn in the uncompiled world by the definitions of `replication.learning.reference`."""
+    world, steps, episodes = FastSoccerWorld(params), 0, options["episodes"]
+    for epsilon in np.linspace(options["epsilon_start"], options["epsilon_end"], episodes).tolist():
+        state, done = world.reset(), False
+        while not done:
+            word = reference.draw(stream)
+            action = reference.choose(q[state], word, epsilon, options["random_ties"])
+            successor, scored, timed_out = world.step(action)
+            value = 0.0 if scored else max(q[successor])
+            target = weights[state][action] + options["gamma"] * value
+            q[state][action] += options["beta"] * (target - q[state][action])
+            state, done, steps = successor, scored or timed_out, steps + 1
+    return q, stream, steps
+
+
+def tables(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint64]]:
+    """Weights that lead to the goal and back, values with ties, and a stream."""
+    rng = np.random.default_rng(seed)
+    q = rng.integers(0, 3, (384, 5)).astype(float)
+    return rng.normal(size=(384, 5)), q, stream(np.random.SeedSequence(seed))
+
+
+@pytest.mark.parametrize("random_ties", [True, False])
+@pytest.mark.parametrize("macro", ["cell", "decision"])
+def test_learning_is_the_reference(random_ties: bool, macro: str) -> None:
+    """Learning returns the bits of the plain loop: Q, the stream and the number of decisions."""
+    params = SoccerParams(time_limit=40.0, macro=macro)
+    options: dict[str, Any] = {
+        "episodes": 12,
+        "beta": 0.6,
+        "gamma": 0.9,
+        "random_ties": random_ties,
+    }
+    options |= {"epsilon_start": 0.3, "epsilon_end": 0.05}
+    weights, q, stream = tables(6)
+    weights[:, FORWARD] += 1.0  # so that some episodes end with a goal
+    got = soccer.learn_trial(params, weights, q, stream, **options)
+    wanted = learn_plainly(params, weights.tolist(), q.tolist(), stream.tolist(), options)
+    assert got[0].tolist() == wanted[0]
+    assert got[1].tolist() == wanted[1]
+    assert got[2] == wanted[2]
+    assert (q == tables(6)[1]).all()
+
+
+def test_new_process_same_bits() -> None:
+    """Another process, with another hash seed, learns the same bits."""
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("0", "42")
+    }
+    assert len(outputs) == 1
+
+
+def test_goal_and_time_out_in_the_target(expert: Expert) -> None:
+    """A goal is worth nothing afterwards; a time-out is not terminal, so its target bootstraps."""
+    pairs, q, world = expert
+    stream = np.arange(1, 5, dtype=np.uint64)
+    rates: dict[str, Any] = {"beta": 1.0, "gamma": 0.5, "epsilon_start": 0.0, "epsilon_end": 0.0}
+    zero = np.zeros((384, 5))
+    got, _, n = soccer.learn_trial(SoccerParams(), zero, q, stream, episodes=1, **rates)
+    assert (n, got[pairs[-1]]) == (15, 0.0)
+    short = SoccerParams(time_limit=world.time - 0.3)  # before the last decision
+    got, _, n = soccer.learn_trial(short, zero, q, stream, episodes=1, **rates)
+    assert (n, got[pairs[-2]]) == (14, 0.5)
+
+
+def test_roll_out_of_the_expert(expert: Expert) -> None:
+    """The greedy policy of a Q that prefers the expert's actions repeats its episode, hitless."""
+    pairs, q, world = expert
+    words = stream(np.random.SeedSequence(7))
+    states, actions, hits, after = soccer.roll_out(SoccerParams(), q, words)
+    assert list(zip(states[:-1].tolist(), actions.tolist(), strict=True)) == pairs
+    assert states[-1] == world.state
+    assert hits.tolist() == [False] * len(pairs)
+    words = words.tolist()
+    for _ in pairs:
+        reference.draw(words)
+    assert after.tolist() == words
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"weights": np.zeros((3, 5))}, "weights"),
+        ({"q": np.full((384, 5), np.nan)}, "q must"),
+        ({"stream": np.zeros(4, np.uint64)}, "stream"),
+        ({"episodes": 0}, "episodes"),
+        ({"gamma": 1.5}, "gamma"),
+        ({"epsilon_end": -0.1}, "epsilon_end"),
+    ],
+)
+def test_learning_checks_its_arguments(change: dict[str, Any], message: str) -> None:
+    """An argument that does not fit is refused by its name."""
+    arguments: dict[str, Any] = {
+        "weights": np.zeros((384, 5)),
+        "q": np.zeros((384, 5)),
+        "stream": np.ones(4, np.uint64),
+        "episodes": 1,
+        "beta": 0.6,
+        "gamma": 0.9,
+        "epsilon_start": 0.3,
+        "epsilon_end": 0.05,
+    }
+    with pytest.raises(ValueError, match=message):
+        soccer.learn_trial(SoccerParams(), **(arguments | change))
