@@ -8,11 +8,13 @@ language = "en"
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "replication.site.extension",
 ]
-exclude_patterns = ["figures", "replication", "data", "source", "_generated"]
+exclude_patterns = ["figures", "replication", "data", "source"]
+templates_path = ["_templates"]
 
 nb_execution_mode = "off"
 nb_code_prompt_show = "Show the code of this cell"
