@@ -15,9 +15,11 @@ from replication import files
 from replication.errors import UserError
 from replication.evidence.tables import read_table
 from replication.files import write_file
-from replication.pipeline.folders import exclusive, executed_folder, outputs_folder
-from replication.pipeline.freshness import FRESH, read_runs, state_of
+from replication.pipeline.folders import exclusive, outputs_folder
+from replication.pipeline.manifest import FRESH, read_runs
+from replication.pipeline.notebook import EXECUTED
 from replication.pipeline.plan import Run, prepare
+from replication.pipeline.run import render_text
 from replication.report.findings import findings_context
 from replication.site import overview
 from replication.site.findings import render_findings
@@ -68,7 +70,7 @@ def build_site(
         raise SiteError(f"{site} holds other files than a site; choose another folder")
     out = outputs_folder("paper")
     work = files.PROJECT / "build" / "site-work"
-    with exclusive((out, work), echo):
+    with exclusive(out, echo), exclusive(work, echo):
         runs = _fresh_runs(notebooks, out)
         _stage(dict(_sources(runs, out)), work)
         echo(f"writing {len(runs)} notebooks and the pages of docs")
@@ -78,14 +80,14 @@ def build_site(
 
 
 def _fresh_runs(notebooks: Sequence[Path], out: Path) -> list[Run]:
-    """Return the runs behind the published notebooks; refuse those that are not fresh."""
-    runs = prepare(notebooks, profile="paper")
+    """Return the runs behind published notebooks, their text up to date; refuse stale ones."""
+    runs = prepare(notebooks, profile="paper", out=out)
     for run in runs:
-        state = state_of(run, out, executed_folder(out, "paper"))
+        state = run.state
         if state.kind != FRESH:
-            name = run.notebook.name
             why = f": {state.why[0]}" if state.why else ""
-            raise SiteError(f"{name} is {state.kind}{why}; first: replicate run {name}")
+            raise SiteError(f"{run.name} is {state.kind}{why}; first: replicate run {run.name}")
+        render_text(run)
     return runs
 
 
@@ -122,15 +124,14 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     for path in sorted(out.rglob("*")):
         if path.is_file() and path.suffix != ".ipynb" and not path.name.startswith("."):
             yield f"figures/{path.relative_to(out).as_posix()}", path.read_bytes()
-    recorded = read_runs(executed_folder(out, "paper"))
+    recorded = read_runs(out)
     for run in runs:
-        name = run.notebook.name
-        done = recorded.get(name, {})
+        done = recorded.get(run.name, {})
         parameters = {**run.notebook.literals, **run.values}
-        origin = Origin(name, parameters, done.get("seconds"), done.get("machine", ""))
-        shown = page(out / name / "notebook.ipynb", origin)
-        yield f"notebooks/{name}.ipynb", json.dumps(shown, indent=1).encode()
-        yield f"source/{name}.ipynb", run.notebook.path.read_bytes()
+        origin = Origin(run.name, parameters, done.get("seconds"), done.get("machine", ""))
+        shown = page(run.folder / EXECUTED, origin)
+        yield f"notebooks/{run.name}.ipynb", json.dumps(shown, indent=1).encode()
+        yield f"source/{run.name}.ipynb", run.notebook.path.read_bytes()
 
 
 def _prose(generated: Mapping[str, str]) -> dict[str, str]:
@@ -182,7 +183,9 @@ def _outline(source: Path) -> str:
     titles = []
     for path in sorted(source.glob("*.md")):
         text = path.read_text(encoding="utf-8")
-        titles += re.findall(r"^# [^\n]*|^```{toctree}.*?^```", text, flags=re.MULTILINE | re.DOTALL)
+        titles += re.findall(
+            r"^# [^\n]*|^```{toctree}.*?^```", text, flags=re.MULTILINE | re.DOTALL
+        )
     return "\n".join(titles)
 
 

@@ -14,9 +14,9 @@ import pandas as pd
 import yaml
 
 from replication.evidence.claims import evidence
-from replication.evidence.tables import markdown, readable_verdicts
 from replication.irl import READINGS
 from replication.paper.register import Choice, load_choices
+from replication.report.readable import markdown, readable_verdicts
 from replication.site.pages import anchor
 
 WIDTH, HEIGHT, MARGIN = 190, 40, 6
@@ -41,7 +41,9 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
     rows = []
     for (id, part), row in zip(compared.groupby("id", sort=False), readable, strict=True):
         notebook, name = evidence(part["task"].iloc[0], part["measure"].iloc[0]).split("/")
-        shown = f"#{anchor(notebook, name)}" if name != "trials" else f"figures/{notebook}/trials.csv"
+        shown = (
+            f"#{anchor(notebook, name)}" if name != "trials" else f"figures/{notebook}/trials.csv"
+        )
         rows.append(
             {
                 "Claim": row["Claim"],
@@ -138,7 +140,9 @@ def choices(shares: pd.DataFrame) -> str:
         {
             "Choice": [f"[{entry.id}](#choice-{entry.id.lower()})" for entry in entries],
             "Where": [entry.place for entry in entries],
-            "Default": [f"`{entry.default}`" if entry.field else entry.default for entry in entries],
+            "Default": [
+                f"`{entry.default}`" if entry.field else entry.default for entry in entries
+            ],
             "Also accepted": [_alternatives(entry) for entry in entries],
             "Matters most to": [_matters(entry, shares) for entry in entries],
         }
