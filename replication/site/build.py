@@ -180,7 +180,7 @@ def _write(work: Path) -> None:
 
 def _outline(source: Path) -> str:
     """Return the titles of the pages and their order."""
-    titles = []
+    titles, part = [], re.compile(r"^# [^\n]*|^```{toctree}.*?^```", re.MULTILINE | re.DOTALL)
     for path in sorted(source.glob("*.md")):
         text = path.read_text(encoding="utf-8")
         titles += re.findall(

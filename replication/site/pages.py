@@ -68,18 +68,21 @@ def _download(text: str, file: str) -> str:
 def page(published: Path, origin: Origin) -> dict[str, Any]:
     """Return the page of a published notebook, a notebook as JSON; its files lie beside it."""
     node: dict[str, Any] = json.loads(published.read_text(encoding="utf-8"))
+    named: set[str] = set()
     node["cells"] = [
-        part for cell in node["cells"] for part in _parts(cell, published.parent, origin)
+        part for cell in node["cells"] for part in _parts(cell, published.parent, origin, named)
     ]
     return node
 
 
-def _parts(cell: dict[str, Any], folder: Path, origin: Origin) -> Iterator[dict[str, Any]]:
+def _parts(
+    cell: dict[str, Any], folder: Path, origin: Origin, named: set[str]
+) -> Iterator[dict[str, Any]]:
     """Yield a cell, and below it a cell of text for each output that is shown as text."""
     if cell["cell_type"] != "code":
         yield {**cell, "source": link_choices("".join(cell["source"]))}
         return
-    shown = [_shown(output, folder, origin) for output in cell["outputs"]]
+    shown = [_shown(output, folder, origin, named) for output in cell["outputs"]]
     kept = [output for output, text in zip(cell["outputs"], shown, strict=True) if text is None]
     tags = [*cell["metadata"].get("tags", []), "hide-input"]
     yield {**cell, "outputs": kept, "metadata": {**cell["metadata"], "tags": tags}}
@@ -89,23 +92,28 @@ def _parts(cell: dict[str, Any], folder: Path, origin: Origin) -> Iterator[dict[
             yield {"cell_type": "markdown", "id": id, "metadata": {}, "source": text}
 
 
-def _shown(output: Mapping[str, Any], folder: Path, origin: Origin) -> str | None:
-    """Return an output as text of the page, or None where the output stays as it is."""
+def _shown(output: Mapping[str, Any], folder: Path, origin: Origin, named: set[str]) -> str | None:
+    """Return an output as text of the page, or None where the output stays as it is.
+
+    A figure and the table beside it may have one name; links lead to the first of them.
+    """
     text = "".join(output.get("data", {}).get("text/markdown", ""))
     known = output.get("metadata", {}).get("replication")
     if known is None:
         return link_choices(text) if text else None
     kind, name = known["kind"], known["name"]
     line = origin.line(folder, name, known.get("code", ""))
-    target, file = anchor(origin.notebook, name), f"../figures/{origin.notebook}/{name}"
+    file = f"../figures/{origin.notebook}/{name}"
+    target = "" if name in named else f"({anchor(origin.notebook, name)})=\n\n"
+    named.add(name)
     if kind == "figure":
         words = " ".join(known["alt"].split())
         return (
-            f"````{{figure}} {file}.png\n:name: {target}\n:alt: {words}\n:width: 700px\n\n"
+            f"{target}````{{figure}} {file}.png\n:alt: {words}\n:width: 700px\n\n"
             f"{_escaped(words)}\n\n{line}\n````"
         )
     body = f"```{{raw}} html\n:file: {file}.html\n```\n" if kind == "player" else text
-    return f"({target})=\n\n{body}\n{{.provenance}}\n{line}\n"
+    return f"{target}{body}\n{{.provenance}}\n{line}\n"
 
 
 def anchor(notebook: str, name: str) -> str:

@@ -47,7 +47,7 @@ def test_a_figure_is_described_and_traced(folder: Path) -> None:
     assert node.cells[1].outputs == []
     text = node.cells[2].source
     assert "{figure} ../figures/toy/fig05.png" in text
-    assert f":name: {anchor('toy', 'fig05')}" in text
+    assert text.startswith(f"({anchor('toy', 'fig05')})=\n\n````")
     assert ":alt: d falls [to 0] at once\n" in text
     assert "\n\nd falls \\[to 0\\] at once\n\n" in text
     assert "seed = 7, trials = 3 · the notebook ran 12 s on Linux, 2 cores" in text
@@ -65,6 +65,16 @@ def test_a_table_has_its_file(folder: Path) -> None:
     assert text.startswith(f"({anchor('toy', 'table1')})=\n\n{TABLE}")
     assert "`CSV <../figures/toy/table1.csv>`" in text
     assert "SVG" not in text
+
+
+def test_a_name_is_a_place_once(folder: Path) -> None:
+    """A figure and a table of one name are both shown; links lead to the first of them."""
+    figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt="it falls")
+    table = shown({"text/markdown": TABLE}, kind="table", name="fig05")
+    cells = made(folder, figure, table).cells
+    assert anchor("toy", "fig05") in cells[2].source
+    assert anchor("toy", "fig05") not in cells[3].source
+    assert cells[3].source.startswith(TABLE)
 
 
 def test_a_player_is_part_of_the_page(folder: Path) -> None:

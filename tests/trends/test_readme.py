@@ -54,7 +54,7 @@ def test_readme_is_read_in_a_minute() -> None:
 
 @pytest.mark.parametrize("marks", ["{0}{0}{1}", "{0}{1}{1}", "{0}", "{1}", "{1}{0}", ""])
 def test_a_mark_that_is_not_there_once_is_refused(tool: Any, marks: str) -> None:
-    """A second or missing mark is an error: the text behind it would never be brought up to date."""
+    """A second or missing mark is an error: the text behind it would become stale unseen."""
     with pytest.raises(tool.MarkError, match=r"README\.md: "):
         tool.fill(marks.format(tool.BEGIN, tool.END), "answer")
 
@@ -212,6 +212,7 @@ def test_early_motions_show_no_difference() -> None:
 def test_q_falls_and_the_reward_has_no_trend() -> None:
     """Q falls clearly; the reward's slope is within one SD of zero, its maximum near the goal."""
     assert (judged("Q-TO-GOAL")["high"] < -0.8).all()
+    assert (judged("REWARD-TO-GOAL")["verdict"] == "reversed").all()
     trials = main_trials("open_maze")
     slopes = trials[trials["method"] == "unified"].groupby("reading")["reward_slope"]
     assert (slopes.mean().abs() < slopes.std()).all()
