@@ -180,13 +180,9 @@ def _write(work: Path) -> None:
 
 def _outline(source: Path) -> str:
     """Return the titles of the pages and their order."""
-    titles, part = [], re.compile(r"^# [^\n]*|^```{toctree}.*?^```", re.MULTILINE | re.DOTALL)
-    for path in sorted(source.glob("*.md")):
-        text = path.read_text(encoding="utf-8")
-        titles += re.findall(
-            r"^# [^\n]*|^```{toctree}.*?^```", text, flags=re.MULTILINE | re.DOTALL
-        )
-    return "\n".join(titles)
+    part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
+    pages = (path.read_text(encoding="utf-8") for path in sorted(source.glob("*.md")))
+    return "\n".join(title for text in pages for title in part.findall(text))
 
 
 def _replace(new: Path, site: Path) -> None:
