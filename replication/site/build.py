@@ -141,11 +141,12 @@ def _prose(generated: Mapping[str, str]) -> dict[str, str]:
         path.relative_to(docs).as_posix(): path.read_text(encoding="utf-8")
         for path in sorted(docs.rglob("*.md"))
     }
-    pages |= {name: text for name, text in generated.items() if name in pages}
-    return {
-        name: link_pages(re.sub(r"<!-- site: (\w+) -->", lambda mark: generated[mark[1]], text))
+    pages |= {name: text for name, text in generated.items() if name.endswith(".md")}
+    pages = {
+        name: re.sub(r"<!-- site: (\w+) -->", lambda mark: generated[mark[1]], text)
         for name, text in pages.items()
     }
+    return {name: text if "/" in name else link_pages(text) for name, text in pages.items()}
 
 
 def _generated(out: Path) -> dict[str, str]:
