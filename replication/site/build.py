@@ -169,7 +169,7 @@ def _write(work: Path) -> None:
     command += ["-c", str(files.PROJECT / "docs"), "-d", str(work / "doctrees")]
     outline, known = _outline(work / "source"), work / "outline"
     if not known.exists() or known.read_text(encoding="utf-8") != outline:
-        command.append("-a")  # the sidebar of every page shows it
+        command += ["-a", "-E"]  # every page shows it at its side, and may link to new pages
     known.unlink(missing_ok=True)
     command += [str(work / "source"), str(work / "html")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
