@@ -20,7 +20,7 @@ from replication.site.build import SiteError, build_site
 CONF = """
 extensions = ["myst_nb"]
 nb_execution_mode = "off"
-exclude_patterns = ["source"]
+exclude_patterns = ["figures", "source"]
 """
 INDEX = "# Toy report\n\n{text}\n\n```{{toctree}}\nnotebooks/toy\n```\n"
 
