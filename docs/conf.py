@@ -1,5 +1,9 @@
 """Sphinx configuration of the report; `make site` lays out the sources and calls Sphinx."""
 
+from pathlib import Path
+
+from sphinx.ext import autosummary
+
 project = "Unified IRL, replicated"
 author = "The replication authors"
 copyright = "the replication authors, MIT licence"
@@ -14,7 +18,8 @@ extensions = [
     "replication.site.extension",
 ]
 exclude_patterns = ["figures", "replication", "data", "source"]
-templates_path = ["_templates"]
+templates_path = [str(Path(__file__).parent / "_templates")]  # the sources are laid out elsewhere
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")  # these end no sentence
 
 nb_execution_mode = "off"
 nb_code_prompt_show = "Show the code of this cell"

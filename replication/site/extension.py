@@ -91,7 +91,7 @@ def improve_tables(body: str) -> str:
         box = soup.new_tag("div", attrs={"class": "table-box", "role": "region", "tabindex": "0"})
         box["aria-label"] = f"Table {number}: {title}"
         table.wrap(box)
-        below = box.find_next_sibling()
+        below = list(table.descendants)[-1].find_next(True)
         if isinstance(below, Tag) and below.select("a.download[href$='.csv']"):
             continue
         link = soup.new_tag("a", href=f"data:text/csv;charset=utf-8,{quote(_csv(rows))}")
