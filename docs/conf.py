@@ -19,7 +19,9 @@ extensions = [
 ]
 exclude_patterns = ["figures", "replication", "data", "source"]
 templates_path = [str(Path(__file__).parent / "_templates")]  # the sources are laid out elsewhere
-autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")  # these end no sentence
+autosummary.WELL_KNOWN_ABBREVIATIONS += (  # type: ignore[assignment]
+    *("Eq.", "Eqs.", "Fig.", "Figs."),  # these end no sentence
+)
 
 nb_execution_mode = "off"
 nb_code_prompt_show = "Show the code of this cell"
