@@ -121,8 +121,8 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     for pattern in PLACES:
         for path in sorted(files.PROJECT.glob(pattern)):
             yield path.relative_to(files.PROJECT).as_posix(), path.read_bytes()
-    for path in sorted(out.rglob("*")):
-        if path.is_file() and path.suffix != ".ipynb" and not path.name.startswith("."):
+    for path in sorted(out.glob("[!.]*/[!.]*")):
+        if path.suffix != ".ipynb":
             yield f"figures/{path.relative_to(out).as_posix()}", path.read_bytes()
     recorded = read_runs(out)
     for run in runs:
