@@ -1,5 +1,9 @@
 """Sphinx configuration of the report; `make site` lays out the sources and calls Sphinx."""
 
+from pathlib import Path
+
+from sphinx.ext import autosummary
+
 project = "Unified IRL, replicated"
 author = "The replication authors"
 copyright = "the replication authors, MIT licence"
@@ -8,11 +12,16 @@ language = "en"
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "replication.site.extension",
 ]
-exclude_patterns = ["figures", "replication", "data", "source", "_generated"]
+exclude_patterns = ["figures", "replication", "data", "source"]
+templates_path = [str(Path(__file__).parent / "_templates")]  # the sources are laid out elsewhere
+autosummary.WELL_KNOWN_ABBREVIATIONS += (  # type: ignore[assignment]
+    *("Eq.", "Eqs.", "Fig.", "Figs."),  # these end no sentence
+)
 
 nb_execution_mode = "off"
 nb_code_prompt_show = "Show the code of this cell"

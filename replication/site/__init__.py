@@ -1,6 +1,5 @@
-"""The report: a static site built from executed notebooks, without executing anything.
+"""The report: a static site built from published notebooks, without executing anything.
 
-`build` checks and stages, `pages` turns an executed notebook into a page, `overview` writes what
-the site says of all of them together, and `extension` is what Sphinx has to know. The prose is in
-`docs/`.
+`build` checks and lays out, `pages` turns a published notebook into a page, `findings` and
+`overview` write what concerns all of them, and `extension` adds to Sphinx. The prose is in `docs/`.
 """

@@ -12,25 +12,30 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from replication import files
+from replication.errors import UserError
 from replication.evidence.tables import read_table
 from replication.files import write_file
-from replication.pipeline import provenance
-from replication.pipeline.folders import exclusive, executed_folder, outputs_folder
-from replication.pipeline.freshness import FRESH, PROSE, read_runs, state_of
+from replication.pipeline.folders import exclusive, outputs_folder
+from replication.pipeline.manifest import FRESH, read_runs
+from replication.pipeline.notebook import EXECUTED
 from replication.pipeline.plan import Run, prepare
-from replication.pipeline.run import refresh_text
+from replication.pipeline.run import render_text
+from replication.report.findings import findings_context
 from replication.site import overview
-from replication.site.pages import Provenance, anchor, page
+from replication.site.findings import render_findings
+from replication.site.pages import Origin, link_pages, page
 
-PLACES = ("replication/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
+PLACES = ("replication/**/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
 """Files of the project that pages link to."""
 
+REFERENCE = "api/modules/"
+"""Where Sphinx lays out the sources of the reference, one for each module."""
 
 INDEX = "searchindex.js"
 """A file that Sphinx writes into every site, and nothing else writes."""
 
 
-class SiteError(ValueError):
+class SiteError(UserError):
     """Something that the site is built from is missing or stale; the message is one line."""
 
 
@@ -39,8 +44,8 @@ def build_site(
 ) -> Path:
     """Build the site from the results in `figures`, without executing anything.
 
-    Text that changed in a notebook is taken over. What a build before has written and still holds
-    is not written again; the site is replaced in one step.
+    A page that has not changed since the last build is not written again; the site is replaced in
+    one step.
 
     Parameters
     ----------
@@ -64,39 +69,37 @@ def build_site(
     if site.exists() and any(site.iterdir()) and not (site / INDEX).exists():
         raise SiteError(f"{site} holds other files than a site; choose another folder")
     out = outputs_folder("paper")
-    folder = executed_folder(out, "paper")
     work = files.PROJECT / "build" / "site-work"
-    with exclusive((out, work), echo):
-        runs = prepare(notebooks, profile="paper")
-        _check(runs, out, folder)
-        _stage(dict(_sources(runs, out, folder)), work)
+    with exclusive(out, echo), exclusive(work, echo):
+        runs = _fresh_runs(notebooks, out)
+        _stage(dict(_sources(runs, out)), work)
         echo(f"writing {len(runs)} notebooks and the pages of docs")
         _write(work)
         _replace(work / "html", site)
     return site / "index.html"
 
 
-def _check(runs: Sequence[Run], out: Path, folder: Path) -> None:
-    """Refuse what is not fresh; take over text that changed."""
+def _fresh_runs(notebooks: Sequence[Path], out: Path) -> list[Run]:
+    """Return the runs behind published notebooks, their text up to date; refuse stale ones."""
+    runs = prepare(notebooks, profile="paper", out=out)
     for run in runs:
-        state = state_of(run, out, folder)
-        if state.kind == PROSE:
-            refresh_text(run.notebook, out, folder)
-        elif state.kind != FRESH:
-            name = run.notebook.name
+        state = run.state
+        if state.kind != FRESH:
             why = f": {state.why[0]}" if state.why else ""
-            raise SiteError(f"{name} is {state.kind}{why}; first: replicate run {name}")
+            raise SiteError(f"{run.name} is {state.kind}{why}; first: replicate run {run.name}")
+        render_text(run)
+    return runs
 
 
 def _stage(staged: Mapping[str, bytes], work: Path) -> None:
     """Lay out what Sphinx reads, in the project's own order of folders.
 
-    What is the same as before keeps its time, else its page would be written again. Sphinx leaves
-    the pages of sources that are gone, so then everything is made anew.
+    What is the same as before keeps its time, or its page would be written again. Sphinx keeps the
+    pages of sources that are gone, so then everything is made anew.
     """
     source = work / "source"
     there = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
-    if there - staged.keys():
+    if any(name not in staged and not _is_reference(name) for name in there):
         for part in ("source", "html", "doctrees"):
             shutil.rmtree(work / part, ignore_errors=True)
     for name, content in staged.items():
@@ -105,47 +108,57 @@ def _stage(staged: Mapping[str, bytes], work: Path) -> None:
             write_file(target, content)
 
 
-def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str, bytes]]:
-    docs = files.PROJECT / "docs"
-    for path in sorted(docs.rglob("*.md")):
-        yield path.relative_to(docs).as_posix(), path.read_bytes()
+def _is_reference(name: str) -> bool:
+    """Whether a source is one that Sphinx made itself, for a module that is still there."""
+    module = files.PROJECT / Path(name).stem.replace(".", "/")
+    return name.startswith(REFERENCE) and (module.is_dir() or module.with_suffix(".py").exists())
+
+
+def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and the content of each file that Sphinx reads, or that pages link to."""
+    for name, text in _prose(_generated(out)).items():
+        yield name, text.encode()
     for pattern in PLACES:
         for path in sorted(files.PROJECT.glob(pattern)):
             yield path.relative_to(files.PROJECT).as_posix(), path.read_bytes()
-    yield "_generated/readme.md", _readme().encode()
-    for path in sorted(out.glob("[!.]*")):
+    for path in sorted(out.glob("[!.]*/[!.]*")):
         if path.suffix != ".ipynb":
-            yield f"figures/{path.name}", path.read_bytes()
-    manifest, remembered = provenance.read_manifest(out), read_runs(folder)
+            yield f"figures/{path.relative_to(out).as_posix()}", path.read_bytes()
+    recorded = read_runs(out)
     for run in runs:
-        name = run.notebook.name
-        done = remembered.get(name, {})
-        came = Provenance(
-            name,
-            manifest[name]["inputs"]["parameters"],
-            done.get("seconds"),
-            done.get("machine", ""),
-        )
-        shown = page(out / run.notebook.executed, out, came)
-        yield f"notebooks/{name}.ipynb", json.dumps(shown, indent=1).encode()
-        yield f"source/{name}.ipynb", run.notebook.path.read_bytes()
-    for name, text in _overview(out).items():
-        yield f"_generated/{name}.md", text.encode()
+        done = recorded.get(run.name, {})
+        parameters = {**run.notebook.literals, **run.values}
+        origin = Origin(run.name, parameters, done.get("seconds"), done.get("machine", ""))
+        shown = page(run.folder / EXECUTED, origin)
+        yield f"notebooks/{run.name}.ipynb", json.dumps(shown, indent=1).encode()
+        yield f"source/{run.name}.ipynb", run.notebook.path.read_bytes()
 
 
-def _readme() -> str:
-    """Return the README; tables and executed notebooks in files that it links to are pages here."""
-    text = (files.PROJECT / "README.md").read_text(encoding="utf-8")
-    text = re.sub(r"(?<=\()figures/(\w+\.ipynb)(?=\))", r"notebooks/\1", text)
-    return re.sub(r"(?<=\()figures/(\w+)\.md(?=\))", lambda match: f"#{anchor(match[1])}", text)
+def _prose(generated: Mapping[str, str]) -> dict[str, str]:
+    """Return the pages of docs/, each mark `<!-- site: name -->` replaced by what is generated."""
+    docs = files.PROJECT / "docs"
+    pages = {
+        path.relative_to(docs).as_posix(): path.read_text(encoding="utf-8")
+        for path in sorted(docs.rglob("*.md"))
+    }
+    pages |= {name: text for name, text in generated.items() if name.endswith(".md")}
+    pages = {
+        name: re.sub(r"<!-- site: (\w+) -->", lambda mark: generated[mark[1]], text)
+        for name, text in pages.items()
+    }
+    return {name: text if "/" in name else link_pages(text) for name, text in pages.items()}
 
 
-def _overview(out: Path) -> dict[str, str]:
-    judged = read_table(out / "claims.csv")
+def _generated(out: Path) -> dict[str, str]:
+    """Return what the site computes from the published tables: parts of pages, and a page."""
+    judged = read_table(out / "claims" / "verdicts.csv")
+    findings, answer = render_findings(out)
     return {
-        "verdicts": overview.verdicts(judged),
+        "answer": answer,
+        "findings.md": findings,
+        "verdicts": overview.verdicts(judged, findings_context(out)["holds"]),
         "published": overview.published(judged),
-        "choices": overview.choices(read_table(out / "sensitivity_shares.csv")),
+        "choices": overview.choices(read_table(out / "sensitivity" / "shares.csv")),
         "citation": overview.citation((files.PROJECT / "CITATION.cff").read_text("utf-8")),
     }
 
@@ -156,23 +169,21 @@ def _write(work: Path) -> None:
     command += ["-c", str(files.PROJECT / "docs"), "-d", str(work / "doctrees")]
     outline, known = _outline(work / "source"), work / "outline"
     if not known.exists() or known.read_text(encoding="utf-8") != outline:
-        command.append("-a")  # the sidebar of every page shows it
+        command += ["-a", "-E"]  # every page shows it at its side, and may link to new pages
     known.unlink(missing_ok=True)
     command += [str(work / "source"), str(work / "html")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.replace(str(work / "source") + os.sep, "").strip()
-        raise SiteError(f"the pages cannot be written: {said}")
+        errors = done.stderr.replace(str(work / "source") + os.sep, "").strip()
+        raise SiteError(f"the pages cannot be written: {errors}")
     write_file(known, outline)
 
 
 def _outline(source: Path) -> str:
     """Return the titles of the pages and their order."""
-    found = []
-    for path in sorted(source.glob("*.md")):
-        text = path.read_text(encoding="utf-8")
-        found += re.findall(r"^# [^\n]*|^```{toctree}.*?^```", text, flags=re.MULTILINE | re.DOTALL)
-    return "\n".join(found)
+    part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
+    pages = (path.read_text(encoding="utf-8") for path in sorted(source.glob("*.md")))
+    return "\n".join(title for text in pages for title in part.findall(text))
 
 
 def _replace(new: Path, site: Path) -> None:

@@ -1,4 +1,4 @@
-"""What Sphinx has to know: formulas as MathML, and tables that can be sorted and taken away."""
+"""Sphinx extension: formulas as MathML, and sortable, downloadable tables."""
 
 from __future__ import annotations
 
@@ -72,9 +72,10 @@ def _improve_tables(
 
 
 def improve_tables(body: str) -> str:
-    """Return a page in which tables with a head sort, scroll by themselves, and can be downloaded.
+    """Return a page whose tables with a head can be sorted, scrolled and downloaded.
 
-    The columns sort by the number that their cells begin with, if all do, and else as text.
+    The columns sort by the number that their cells begin with, if all do, and else as text. A table
+    gets a link to its cells as CSV unless a link to a CSV file stands below it.
     """
     soup = BeautifulSoup(body, "html.parser")
     for number, table in enumerate(soup.find_all("table"), 1):
@@ -90,6 +91,9 @@ def improve_tables(body: str) -> str:
         box = soup.new_tag("div", attrs={"class": "table-box", "role": "region", "tabindex": "0"})
         box["aria-label"] = f"Table {number}: {title}"
         table.wrap(box)
+        below = list(table.descendants)[-1].find_next(True)
+        if isinstance(below, Tag) and below.select("a.download[href$='.csv']"):
+            continue
         link = soup.new_tag("a", href=f"data:text/csv;charset=utf-8,{quote(_csv(rows))}")
         link["class"] = "table-csv"
         link["download"] = f"table-{number}.csv"
@@ -102,9 +106,9 @@ def _add_keys(rows: list[list[Tag]]) -> None:
     """Give each cell of a column of numbers the number as its sorting key."""
     for column in zip(*rows, strict=False):
         texts = [cell.get_text(" ", strip=True) for cell in column]
-        found = [NUMBER.match(text) for text in texts]
-        if all(match or text in ("", "–") for match, text in zip(found, texts, strict=True)):
-            for cell, match in zip(column, found, strict=True):
+        matches = [NUMBER.match(text) for text in texts]
+        if all(match or text in ("", "–") for match, text in zip(matches, texts, strict=True)):
+            for cell, match in zip(column, matches, strict=True):
                 number = match[1].replace(",", "") if match else ""
                 cell["data-sort"] = number
 

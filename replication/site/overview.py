@@ -1,55 +1,54 @@
-"""What the site says of all notebooks together: verdicts at a glance, choices, the citation.
+"""What the site shows of all notebooks together: verdicts, choices, the citation.
 
-Each function returns Markdown, computed from the published results and the registers.
+Each function returns Markdown, computed from the published tables and the registers.
 """
 
 from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
-from itertools import chain
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pandas as pd
 import yaml
 
-from replication.evidence.tables import markdown, readable_verdicts
+from replication.evidence.claims import evidence
 from replication.irl import READINGS
 from replication.paper.register import Choice, load_choices
+from replication.report.readable import markdown, readable_verdicts
 from replication.site.pages import anchor
-
-EVIDENCE = {
-    ("open-maze", "iterations"): "table1_contrasts",
-    ("open-maze", "converged"): "fig05",
-    ("open-maze", "q_growth"): "fig07",
-    ("open-maze", "q_slope"): "fig07",
-    ("open-maze", "reward_slope"): "fig07",
-    ("obstacle-maze", "iterations"): "table2_contrasts",
-    ("obstacle-maze", "converged"): "fig09_errors",
-    ("soccer", "iterations"): "soccer_contrasts",
-    ("soccer", "converged"): "fig12",
-}
-"""Where the numbers behind a claim are shown, by task and measure; else with all claims' trials."""
 
 WIDTH, HEIGHT, MARGIN = 190, 40, 6
 """Of an interval plot, in pixels."""
 
+HEIGHTS = {"printed": 13, "updated": 27}
+"""At which height each reading of Eq. 9 is drawn."""
 
-def verdicts(judged: pd.DataFrame) -> str:
-    """Return the claims with their intervals, each verdict with a link to its evidence."""
+
+def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
+    """Return the claims with their intervals, each verdict with a link to its evidence.
+
+    Parameters
+    ----------
+    judged
+        The table of verdicts.
+    holds
+        By claim, in how many of the other specifications it holds.
+    """
     compared = judged[judged["direction"] != "inside"]
-    readable = readable_verdicts(compared)
+    readable = readable_verdicts(compared).to_dict("records")
     rows = []
-    for (_, part), row in zip(
-        compared.groupby("id", sort=False), readable.to_dict("records"), strict=True
-    ):
-        first = part.iloc[0]
-        evidence = EVIDENCE.get((first["task"], first["measure"]), "claims_trials")
+    for (id, part), row in zip(compared.groupby("id", sort=False), readable, strict=True):
+        notebook, name = evidence(part["task"].iloc[0], part["measure"].iloc[0]).split("/")
+        shown = (
+            f"#{anchor(notebook, name)}" if name != "trials" else f"figures/{notebook}/trials.csv"
+        )
         rows.append(
             {
                 "Claim": row["Claim"],
-                "Verdict": f"[{row['Verdict']}](#{anchor(evidence)})",
+                "Verdict": f"[{row['Verdict']}]({shown})",
+                "Holds with other choices": holds[str(id)],
                 "Paper": f"{row['Paper']} ({row['Place']})".removeprefix("– "),
                 "Effect, with 95 % interval": interval_plot(part),
                 "Fᵢ (printed)": row["Fᵢ (printed)"],
@@ -60,9 +59,11 @@ def verdicts(judged: pd.DataFrame) -> str:
 
 
 def published(judged: pd.DataFrame) -> str:
-    """Return how the published numbers themselves come out."""
-    inside = judged[judged["direction"] == "inside"]
-    return markdown(readable_verdicts(inside))
+    """Return the verdicts on the published numbers themselves."""
+    return markdown(readable_verdicts(judged[judged["direction"] == "inside"]))
+
+
+# --- a small picture of a claim --------------------------------------------------------------
 
 
 def interval_plot(part: pd.DataFrame) -> str:
@@ -73,68 +74,61 @@ def interval_plot(part: pd.DataFrame) -> str:
     """
     first = part.iloc[0]
     margin, paper = float(first["margin"]), float(first["paper"])
-    ends = [margin, *part["low"], *part["high"], *part["effect"]]
-    known = [float(one) for one in (*ends, paper) if not math.isnan(one)]
-    low, high = min(known), max(known)
-    scale = (WIDTH - 2 * MARGIN) / ((high - low) or 1.0)
+    values = [margin, paper, *part[["effect", "low", "high"]].to_numpy(float).ravel()]
+    known = [value for value in values if not math.isnan(value)]
+    left, width = min(known), (max(known) - min(known)) or 1.0
 
     def x(value: float) -> float:
-        return round(MARGIN + (value - low) * scale, 1)
+        return round(MARGIN + (value - left) / width * (WIDTH - 2 * MARGIN), 1)
 
     edge = x(margin)
-    side = (0.0, edge) if first["direction"] == "less" else (edge, WIDTH - edge)
+    begin, end = (0.0, edge) if first["direction"] == "less" else (edge, float(WIDTH))
     marks = [
-        f'<rect class="claimed" x="{side[0]}" y="0" width="{round(side[1], 1)}" '
-        f'height="{HEIGHT}"></rect>',
-        f'<line class="edge" x1="{edge}" x2="{edge}" y1="0" y2="{HEIGHT}"></line>',
+        _mark("rect", "claimed", x=begin, y=0, width=round(end - begin, 1), height=HEIGHT),
+        _mark("line", "edge", x1=edge, x2=edge, y1=0, y2=HEIGHT),
     ]
-    for one in part.itertuples():
-        if math.isnan(one.effect):
-            continue
-        kind, y, at = (
-            _reading(one.F),
-            {"printed": 13, "updated": 27}[_reading(one.F)],
-            x(one.effect),
-        )
-        marks.append(
-            f'<line class="{kind}" x1="{x(one.low)}" x2="{x(one.high)}" y1="{y}" y2="{y}"></line>'
-        )
-        shape = (
-            f'<circle class="{kind}" cx="{at}" cy="{y}" r="4"></circle>'
-            if kind == "printed"
-            else f'<rect class="{kind}" x="{at - 3.5:.1f}" y="{y - 3.5}" width="7" height="7">'
-            "</rect>"
-        )
-        marks.append(shape)
+    for row in part.dropna(subset="effect").itertuples():
+        reading = _reading(row.reading)
+        y, at = HEIGHTS[reading], x(row.effect)
+        marks.append(_mark("line", reading, x1=x(row.low), x2=x(row.high), y1=y, y2=y))
+        if reading == READINGS[0]:
+            marks.append(_mark("circle", reading, cx=at, cy=y, r=4))
+        else:
+            marks.append(_mark("rect", reading, x=round(at - 3.5, 1), y=y - 3.5, width=7, height=7))
     if not math.isnan(paper):
         at = x(paper)
-        marks.append(
-            f'<polygon class="paper" points="{at - 5:.1f},15 {at + 5:.1f},15 {at},24"></polygon>'
-        )
-    said = html.escape(_in_words(part), quote=True)
+        marks.append(_mark("polygon", "paper", points=f"{at - 5:.1f},15 {at + 5:.1f},15 {at},24"))
     return (
-        f'<svg class="interval" role="img" aria-label="{said}" viewBox="0 0 {WIDTH} {HEIGHT}" '
-        f'width="{WIDTH}" height="{HEIGHT}">{"".join(marks)}</svg>'
+        f'<svg class="interval" role="img" aria-label="{html.escape(_in_words(part))}" '
+        f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">{"".join(marks)}</svg>'
     )
 
 
-def _reading(f_index: str) -> str:
-    """Return the reading of Eq. 9; a claim about a method without a trace has but one line."""
-    return f_index or READINGS[0]
+def _mark(shape: str, kind: str, **places: object) -> str:
+    numbers = " ".join(f'{name}="{value}"' for name, value in places.items())
+    return f'<{shape} class="{kind}" {numbers}></{shape}>'
+
+
+def _reading(reading: str) -> str:
+    """Return a reading of Eq. 9; a claim about a method without a trace has but one line."""
+    return reading or READINGS[0]
 
 
 def _in_words(part: pd.DataFrame) -> str:
     first = part.iloc[0]
-    own = "; ".join(
-        f"{_reading(row.F)} F: {row.effect:.3g} from {row.low:.3g} to {row.high:.3g}"
+    effects = "; ".join(
+        f"{_reading(row.reading)} F: {row.effect:.3g} from {row.low:.3g} to {row.high:.3g}"
         for row in part.itertuples()
     )
     paper = "" if math.isnan(first["paper"]) else f" Paper: {first['paper']:.3g}."
-    return f"{own}. Margin: {first['margin']:.3g}.{paper}"
+    return f"{effects}. Margin: {first['margin']:.3g}.{paper}"
+
+
+# --- choices and citation --------------------------------------------------------------------
 
 
 def choices(shares: pd.DataFrame) -> str:
-    """Return every choice: a table of all, and below it what is known of each.
+    """Return every choice: a table of all, and a section on each.
 
     Parameters
     ----------
@@ -144,52 +138,47 @@ def choices(shares: pd.DataFrame) -> str:
     entries = list(load_choices().values())
     table = pd.DataFrame(
         {
-            "Choice": [f"[{one.id}](#choice-{one.id.lower()})" for one in entries],
-            "Where": [one.place for one in entries],
-            "Default": [f"`{one.default}`" if one.field else one.default for one in entries],
-            "Also accepted": [_alternatives(one) for one in entries],
-            "Matters most to": [_matters(one, shares) for one in entries],
+            "Choice": [f"[{entry.id}](#choice-{entry.id.lower()})" for entry in entries],
+            "Where": [entry.place for entry in entries],
+            "Default": [
+                f"`{entry.default}`" if entry.field else entry.default for entry in entries
+            ],
+            "Also accepted": [_alternatives(entry) for entry in entries],
+            "Matters most to": [_matters(entry, shares) for entry in entries],
         }
     )
-    return "\n".join([markdown(table), *chain.from_iterable(map(_choice, entries))])
+    return "\n".join([markdown(table), *(line for entry in entries for line in _section(entry))])
 
 
-def _choice(one: Choice) -> Sequence[str]:
-    embodied = one.field or one.data or one.code
-    return (
-        f"(choice-{one.id.lower()})=",
-        "",
-        f"### {one.id}",
-        "",
-        f"*{one.place}.* {one.open}",
-        "",
-        f"**Default:** `{one.default}`. {one.rule}",
-        "",
-        f"**Also accepted:** {_alternatives(one)}. **Where it is set:** `{embodied}`.",
-        "",
-    )
+def _section(entry: Choice) -> Iterator[str]:
+    yield f"(choice-{entry.id.lower()})=\n"
+    yield f"### {entry.id}\n"
+    yield f"*{entry.place}.* {entry.open}\n"
+    yield f"**Default:** `{entry.default}`. {entry.rule}\n"
+    where = entry.field or entry.data or entry.code
+    yield f"**Also accepted:** {_alternatives(entry)}. **Where it is set:** `{where}`.\n"
 
 
-def _alternatives(one: Choice) -> str:
-    if one.range is not None:
-        return f"{one.range[0]:g} to {one.range[1]:g}"
-    return ", ".join(f"`{value}`" for value in one.alternatives) or "–"
+def _alternatives(entry: Choice) -> str:
+    if entry.range is not None:
+        return f"{entry.range[0]:g} to {entry.range[1]:g}"
+    return ", ".join(f"`{value}`" for value in entry.alternatives) or "–"
 
 
-def _matters(one: Choice, shares: pd.DataFrame) -> str:
-    varied = shares[shares["choice"] == ("MAP" if one.id.startswith("MAP-") else one.id)]
-    own = varied[varied["share"] >= 0.05].sort_values("share", ascending=False)
-    said = ", ".join(f"{row.claim} ({100 * row.share:.0f} %)" for row in own.itertuples())
-    return said or ("none" if len(varied) else "–")
+def _matters(entry: Choice, shares: pd.DataFrame) -> str:
+    varied = shares[shares["choice"] == ("MAP" if entry.id.startswith("MAP-") else entry.id)]
+    large = varied[varied["share"] >= 0.05].sort_values("share", ascending=False)
+    claims = ", ".join(f"{row.claim} ({100 * row.share:.0f} %)" for row in large.itertuples())
+    return claims or ("none" if len(varied) else "–")
 
 
 def citation(text: str) -> str:
     """Return how to cite, from the text of CITATION.cff."""
     cff: dict[str, Any] = yaml.safe_load(text)
     paper = cff["references"][0]
-    authors = [f"{one['given-names']} {one['family-names']}" for one in paper["authors"]]
-    doi = f"doi:{cff['doi']}" if "doi" in cff else "no DOI yet: it will stand here after a release"
-    software = ", ".join(one["name"] for one in cff["authors"])
+    authors = [f"{author['given-names']} {author['family-names']}" for author in paper["authors"]]
+    doi = f"doi:{cff['doi']}" if "doi" in cff else "no DOI yet: it is shown here after a release"
+    software = ", ".join(author["name"] for author in cff["authors"])
     return (
         f"**The paper:** {', '.join(authors[:-1])} and {authors[-1]}. *{paper['title']}*.\n\n"
         f"**This package:** {software}. *{cff['title']}*. Version {cff['version']} ({doi}).\n"

@@ -1,29 +1,27 @@
-"""Pages of the site from executed notebooks: a caption under each figure, a file for each table.
+"""Pages of the site from published notebooks: a caption under each figure, files under each table.
 
-A page is a notebook again. The outputs that are also files become cells of text, with what a reader
-wants to know of them: what one sees, from which run it comes, and where data and code are.
+A page is a notebook again. What an output is stands in its metadata, where the notebook put it when
+it displayed it: kind, name, words and code (see :mod:`replication.report.outputs`).
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from replication.paper.register import load_choices
 
-PICTURE = re.compile(r"!\[(?P<alt>.*)\]\((?P<file>[\w.-]+)\)", re.DOTALL)
-PLAYER = re.compile(r"\[[\w.-]+\]\((?P<file>[\w.-]+\.html)\)")
-CALLED = re.compile(r"\b(figures|claim_figures|field_figures|players|tables|calibration)\.(\w+)\(")
-DRAWS = re.compile(r"_figure$|_table$|_player$|^animate$|^readable_")
+SHOWN = ("seed", "trials", "set_trials", "choices")
+"""Parameters that a reader wants to know of a run."""
 
 
 @dataclass(frozen=True)
-class Provenance:
-    """What stands under each output of a notebook.
+class Origin:
+    """Where the outputs of a notebook come from.
 
     Attributes
     ----------
@@ -32,7 +30,7 @@ class Provenance:
     parameters
         The parameters of the run.
     seconds, machine
-        Run time of the whole notebook, and where; None and empty if the run is not known here.
+        Run time of the whole notebook, and where; None and empty if not recorded on this machine.
     """
 
     notebook: str
@@ -40,87 +38,91 @@ class Provenance:
     seconds: float | None = None
     machine: str = ""
 
-    def line(self, files: Sequence[str], code: str) -> str:
-        """Return the line of an output, which is also in files, and that some code made."""
-        named = ("seed", "trials", "set_trials", "most_trials", "choices")
+    def line(self, folder: Path, name: str, code: str = "") -> str:
+        """Return the line under an output: its run, its files in `folder`, and its code."""
         values = [
-            f"{name} = {self.parameters[name]}"
-            for name in named
-            if self.parameters.get(name) not in (None, {})
+            f"{key} = {self.parameters[key]}"
+            for key in SHOWN
+            if self.parameters.get(key) not in (None, {})
         ]
-        took = f"{self.seconds:.0f} s" if self.seconds is not None else "not recorded here"
-        if self.machine:
-            took += f" on {self.machine}"
-        links = [_download(Path(file).suffix[1:].upper(), f"figures/{file}") for file in files]
-        drawn = sorted({(m[1], m[2]) for m in CALLED.finditer(code) if DRAWS.search(m[2])})
-        functions = [f"{{py:func}}`~replication.{module}.{name}`" for module, name in drawn]
+        files = [
+            _download(suffix.upper(), f"figures/{self.notebook}/{name}.{suffix}")
+            for suffix in ("csv", "svg")  # pictures and players are on the page itself
+            if (folder / f"{name}.{suffix}").exists()
+        ]
+        took = f"the notebook ran {self.seconds:.0f} s" if self.seconds is not None else ""
         parts = [
             ", ".join(values),
-            f"run time of the notebook: {took}",
-            f"files: {', '.join(links)}",
+            f"{took} on {self.machine}" if took and self.machine else took,
+            ", ".join(files),
             _download("notebook", f"source/{self.notebook}.ipynb"),
+            f"code: {{py:func}}`~{code}`" if code else "",
         ]
-        if functions:
-            parts.append(f"code: {', '.join(functions)}")
-        return " · ".join(part for part in parts if part)
+        return " · ".join(filter(None, parts))
 
 
 def _download(text: str, file: str) -> str:
     return f"{{download}}`{text} <../{file}>`"
 
 
-def page(executed: Path, files: Path, provenance: Provenance) -> dict[str, Any]:
-    """Return the page of an executed notebook, a notebook as JSON.
-
-    Parameters
-    ----------
-    executed
-        The notebook as it was published, with links to its outputs.
-    files
-        The folder of the outputs.
-    provenance
-        What stands under each of them.
-    """
-    node: dict[str, Any] = json.loads(executed.read_text(encoding="utf-8"))
-    tables = {path.read_text(encoding="utf-8"): path.stem for path in sorted(files.glob("*.md"))}
-    cells: list[dict[str, Any]] = []
-    defined: dict[str, str] = {}
-    for cell in node["cells"]:
-        cells.append(cell)
-        if cell["cell_type"] == "markdown":
-            cell["source"] = link_choices("".join(cell["source"]))
-            continue
-        code = "".join(cell["source"])
-        called = [text for name, text in defined.items() if f"{name}(" in code]
-        defined |= {match[1]: code for match in re.finditer(r"^def (\w+)", code, re.MULTILINE)}
-        cell["metadata"].setdefault("tags", []).append("hide-input")
-        kept = []
-        for at, output in enumerate(cell["outputs"]):
-            text = "".join(output.get("data", {}).get("text/markdown", ""))
-            if not text:
-                kept.append(output)
-                continue
-            shown = _shown(text, tables, files, "".join([code, *called]), provenance)
-            cells.append(
-                {
-                    "cell_type": "markdown",
-                    "id": f"{cell['id']}-output-{at}",
-                    "metadata": {},
-                    "source": shown,
-                }
-            )
-        cell["outputs"] = kept
-    node["cells"] = cells
+def page(published: Path, origin: Origin) -> dict[str, Any]:
+    """Return the page of a published notebook, a notebook as JSON; its files lie beside it."""
+    node: dict[str, Any] = json.loads(published.read_text(encoding="utf-8"))
+    named: set[str] = set()
+    node["cells"] = [
+        part for cell in node["cells"] for part in _parts(cell, published.parent, origin, named)
+    ]
     return node
 
 
-def anchor(name: str) -> str:
-    """Return the name by which pages refer to an output."""
-    return f"result-{name.replace('_', '-')}"
+def _parts(
+    cell: dict[str, Any], folder: Path, origin: Origin, named: set[str]
+) -> Iterator[dict[str, Any]]:
+    """Yield a cell, and below it a cell of text for each output that is shown as text."""
+    if cell["cell_type"] != "code":
+        yield {**cell, "source": link_choices("".join(cell["source"]))}
+        return
+    shown = [_shown(output, folder, origin, named) for output in cell["outputs"]]
+    kept = [output for output, text in zip(cell["outputs"], shown, strict=True) if text is None]
+    tags = [*cell["metadata"].get("tags", []), "hide-input"]
+    yield {**cell, "outputs": kept, "metadata": {**cell["metadata"], "tags": tags}}
+    for at, text in enumerate(shown):
+        if text is not None:
+            id = f"{cell['id']}-output-{at}"
+            yield {"cell_type": "markdown", "id": id, "metadata": {}, "source": text}
+
+
+def _shown(output: Mapping[str, Any], folder: Path, origin: Origin, named: set[str]) -> str | None:
+    """Return an output as text of the page, or None where the output stays as it is.
+
+    A figure and the table beside it may have one name; links lead to the first of them.
+    """
+    text = "".join(output.get("data", {}).get("text/markdown", ""))
+    known = output.get("metadata", {}).get("replication")
+    if known is None:
+        return link_choices(text) if text else None
+    kind, name = known["kind"], known["name"]
+    line = origin.line(folder, name, known.get("code", ""))
+    file = f"../figures/{origin.notebook}/{name}"
+    target = "" if name in named else f"({anchor(origin.notebook, name)})=\n\n"
+    named.add(name)
+    if kind == "figure":
+        words = " ".join(known["alt"].split())
+        return (
+            f"{target}````{{figure}} {file}.png\n:alt: {words}\n:width: 700px\n\n"
+            f"{_escaped(words)}\n\n{line}\n````"
+        )
+    body = f"```{{raw}} html\n:file: {file}.html\n```\n" if kind == "player" else text
+    return f"{target}{body}\n{{.provenance}}\n{line}\n"
+
+
+def anchor(notebook: str, name: str) -> str:
+    """Return the name by which pages refer to an output of a notebook."""
+    return f"result-{notebook}-{name}".replace("_", "-")
 
 
 def link_choices(text: str) -> str:
-    """Return Markdown in which the id of a registered choice leads to what is said of it.
+    """Return Markdown in which the id of a registered choice leads to its description.
 
     Examples
     --------
@@ -135,46 +137,31 @@ def link_choices(text: str) -> str:
     )
 
 
-def _shown(
-    text: str, tables: Mapping[str, str], files: Path, code: str, provenance: Provenance
-) -> str:
-    """Return what a page shows of an output in Markdown."""
-    if picture := PICTURE.fullmatch(text.strip()):
-        name = Path(picture["file"]).stem
-        return _figure(name, picture["alt"], provenance.line(_beside(files, name), code))
-    if player := PLAYER.fullmatch(text.strip()):
-        name = Path(player["file"]).stem
-        said = provenance.line(_beside(files, name), code)
-        return (
-            f"({anchor(name)})=\n\n```{{raw}} html\n:file: ../figures/{player['file']}\n```\n\n"
-            f"{{.provenance}}\n{said}\n"
-        )
-    if text in tables:
-        name = tables[text]
-        said = provenance.line(_beside(files, name), code)
-        return f"({anchor(name)})=\n\n{text}\n{{.provenance}}\n{said}\n"
-    return link_choices(text)
+def link_pages(text: str) -> str:
+    """Return a page of docs/ with its links to other folders as links within the site.
 
+    A published table or notebook is part of a page; any other file is laid out below the pages.
 
-def _figure(name: str, alt: str, said: str) -> str:
-    return (
-        f"````{{figure}} ../figures/{name}.png\n:name: {anchor(name)}\n:alt: {_plain(alt)}\n"
-        f":width: 700px\n\n"
-        f"{alt}\n\n{said}\n````"
+    Examples
+    --------
+    >>> link_pages("[a](../figures/soccer/summary.md) [b](../figures/soccer/notebook.ipynb)")
+    '[a](#result-soccer-summary) [b](notebooks/soccer.ipynb)'
+    >>> link_pages("![c](../figures/soccer/fig12.png)")
+    '![c](figures/soccer/fig12.png)'
+    """
+    text = re.sub(r"\]\(\.\./figures/(\w+)/notebook\.ipynb\)", r"](notebooks/\1.ipynb)", text)
+    text = re.sub(
+        r"\]\(\.\./figures/(\w+)/(\w+)\.md\)", lambda m: f"](#{anchor(m[1], m[2])})", text
     )
+    return text.replace("](../", "](")
 
 
-def _plain(alt: str) -> str:
-    """Return the text of an escaped one, for an option, which has one line and no markup."""
-    return re.sub(r"\\(.)", r"\1", " ".join(alt.split()))
+def _escaped(words: str) -> str:
+    r"""Return plain words as Markdown.
 
-
-def _beside(files: Path, name: str) -> list[str]:
-    """Return the files of an output, its numbers first."""
-    return sorted(_named(files, name), key=lambda file: (not file.endswith(".csv"), file))
-
-
-def _named(files: Path, name: str) -> Iterator[str]:
-    for suffix in (".csv", ".svg"):  # pictures and players are on the page itself
-        if (files / f"{name}{suffix}").exists():
-            yield f"{name}{suffix}"
+    Examples
+    --------
+    >>> print(_escaped("4 [3, 5] of a*b"))
+    4 \[3, 5\] of a\*b
+    """
+    return re.sub(r"([\\`*_\[\]<>$#|])", r"\\\1", words)

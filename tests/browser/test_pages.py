@@ -1,4 +1,4 @@
-"""The built site in a real browser, from disk: what a reader sees, on a telephone and on a desk."""
+"""The built site in a real browser, from disk: what a reader sees, on a phone and on a desk."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ pytestmark = pytest.mark.skipif(
 NARROW, WIDE = {"width": 390, "height": 844}, {"width": 1600, "height": 1000}
 PLAYERS = ("notebooks/open_maze", "notebooks/obstacle_maze", "notebooks/soccer")
 READ = (
-    *("index", "choices", "methods", "running", "demos", "cite"),
-    *("api/index", "api/tasks", "api/learning", "api/evidence", "api/drawing", "api/running"),
+    *("index", "findings", "claims", "choices", "trust", "methods"),
+    *("running", "demonstrations", "architecture", "api/index", "cite"),
     *PLAYERS,
-    *("notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
+    *("notebooks/method", "notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
 )
 """Every page that is written for readers; others list code."""
 
@@ -69,10 +69,10 @@ def open_page(browser: Browser, site: Path) -> Iterator[Open]:
     def open_page(name: str, *, size: dict[str, int] = WIDE, **options: Any) -> Page:
         contexts.append(browser.new_context(viewport=size, **options))  # type: ignore[arg-type]
         page = contexts[-1].new_page()
-        page.on("console", lambda said: faults.extend([said.text] * (said.type == "error")))
+        page.on("console", lambda line: faults.extend([line.text] * (line.type == "error")))
         page.on("pageerror", lambda error: faults.append(str(error)))
-        page.on("requestfailed", lambda one: faults.append(f"failed: {one.url[:200]}"))
-        page.on("request", lambda one: faults.extend([one.url] * (not _is_local(one.url))))
+        page.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url[:200]}"))
+        page.on("request", lambda asked: faults.extend([asked.url] * (not _is_local(asked.url))))
         page.goto((site / f"{name}.html").as_uri())
         return page
 
@@ -89,30 +89,31 @@ def _is_local(address: str) -> bool:
 def test_every_page_for_readers_is_tested(site: Path) -> None:
     """No page is written that the tests below do not open, but for lists of code."""
     made = {path.relative_to(site).with_suffix("").as_posix() for path in site.rglob("*.html")}
-    lists = {name for name in made if name.startswith(("_", "genindex", "py-modindex", "search"))}
+    code = ("_", "genindex", "py-modindex", "search", "api/modules/")
+    lists = {name for name in made if name.startswith(code)}
     assert made - lists == set(READ)
 
 
 @pytest.mark.parametrize("name", READ)
 def test_pages_load_and_fit(open_page: Open, name: str) -> None:
-    """A page loads from disk without a fault; on a telephone it does not scroll sideways."""
+    """A page loads from disk without a fault; on a phone it does not scroll sideways."""
     for size in (NARROW, WIDE):
         page = open_page(name, size=size)
         assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
 
 
 @pytest.mark.parametrize("name", READ)
-def test_images_are_there_and_speak(open_page: Open, name: str) -> None:
+def test_images_are_there_and_described(open_page: Open, name: str) -> None:
     """Every picture has loaded and has words for those who do not see it."""
     page = open_page(name)
-    found = page.evaluate(
-        "Promise.all([...document.images].map(one => one.decode().then(() => [one.alt,"
-        " one.naturalWidth], () => [one.alt, 0])))"
+    images = page.evaluate(
+        "Promise.all([...document.images].map(image => image.decode().then(() => [image.alt,"
+        " image.naturalWidth], () => [image.alt, 0])))"
     )
-    assert all(len(alt) > 20 and width > 0 for alt, width in found), found
+    assert all(len(alt) > 20 and width > 0 for alt, width in images), images
     assert page.evaluate(
-        "[...document.querySelectorAll('main svg.interval')].every(one =>"
-        " one.getAttribute('aria-label'))"
+        "[...document.querySelectorAll('main svg.interval')].every(plot =>"
+        " plot.getAttribute('aria-label'))"
     )
 
 
@@ -121,11 +122,11 @@ def test_images_are_there_and_speak(open_page: Open, name: str) -> None:
 def test_pages_are_accessible(open_page: Open, name: str, scheme: str) -> None:
     """The checks of axe-core find no serious fault, in light and in dark."""
     page = open_page(name, color_scheme=scheme)
-    found = Axe().run(page, options={"preload": False}).response["violations"]
+    violations = Axe().run(page, options={"preload": False}).response["violations"]
     grave = [
-        (one["id"], one["nodes"][0]["html"])
-        for one in found
-        if one["impact"] in ("serious", "critical")
+        (fault["id"], fault["nodes"][0]["html"])
+        for fault in violations
+        if fault["impact"] in ("serious", "critical")
     ]
     assert grave == []
 
@@ -144,7 +145,7 @@ def test_the_colour_scheme_is_the_readers(open_page: Open) -> None:
 def test_links_lead_somewhere(site: Path) -> None:
     """Every link of every page leads to a file of the site and, in a page, to an existing place."""
     places = {
-        path: {one["id"] for one in soup(path).find_all(id=True)} for path in site.rglob("*.html")
+        path: {tag["id"] for tag in soup(path).find_all(id=True)} for path in site.rglob("*.html")
     }
     lost = []
     for path in places:
@@ -173,14 +174,15 @@ def soup(path: Path) -> BeautifulSoup:
     return BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
 
 
-def test_every_figure_has_what_stands_under_it(site: Path) -> None:
-    """Seed, run time, data, notebook and code are under each figure of each experiment."""
+def test_every_figure_is_traced(site: Path) -> None:
+    """Data, notebook and code are under each figure, and the seed where it comes from a run."""
     for name in (*PLAYERS, "notebooks/claims", "notebooks/sensitivity"):
         figures = soup(site / f"{name}.html").select("main figure")
         assert figures
         for figure in figures:
             text = figure.get_text(" ", strip=True)
-            for part in ("seed = ", "run time of the notebook", "CSV", "notebook", "code"):
+            seed = ["seed = "] * (name in PLAYERS)
+            for part in (*seed, "CSV", "notebook", "code"):
                 assert part in text, (name, text)
 
 
@@ -206,7 +208,7 @@ def test_a_player_works_by_mouse(open_page: Open, name: str) -> None:
     press("First frame")
     assert picture.get_attribute("src") == first
     press("Play")
-    page.wait_for_function("one => one.value >= 2", arg=slider.element_handle())
+    page.wait_for_function("slider => slider.value >= 2", arg=slider.element_handle())
     press("Pause")
     stopped = slider.input_value()
     page.wait_for_timeout(800)
@@ -229,7 +231,7 @@ def test_a_player_works_by_keyboard(open_page: Open, name: str) -> None:
     assert picture.get_attribute("src") == first
     player.get_by_role("button", name="Play", exact=True).focus()
     page.keyboard.press("Space")
-    page.wait_for_function("one => one.value >= 2", arg=slider.element_handle())
+    page.wait_for_function("slider => slider.value >= 2", arg=slider.element_handle())
 
 
 def test_players_show_the_methods_side_by_side(open_page: Open) -> None:
@@ -246,12 +248,12 @@ def test_players_show_the_methods_side_by_side(open_page: Open) -> None:
 
 def column(page: Page, number: int) -> list[str]:
     """Return a column of the first table."""
-    found: list[str] = page.evaluate(
+    cells: list[str] = page.evaluate(
         "n => [...document.querySelectorAll('table.sortable')[0].tBodies[0].rows].map(row =>"
         " row.cells[n].dataset.sort ?? row.cells[n].textContent.trim())",
         number,
     )
-    return found
+    return cells
 
 
 @pytest.mark.parametrize("by", ["mouse", "keyboard"])
@@ -259,8 +261,8 @@ def test_tables_sort(open_page: Open, by: str) -> None:
     """A click on a head, or Enter, sorts by its numbers, down and then up."""
     page = open_page("notebooks/open_maze")
     head = page.locator("table.sortable").first.locator("th", has_text="iterations")
-    number = head.evaluate("one => one.cellIndex")
-    before = [float(one) for one in column(page, number)]
+    number = head.evaluate("cell => cell.cellIndex")
+    before = [float(cell) for cell in column(page, number)]
     assert before != sorted(before)
     for order, direction in (
         (sorted(before, reverse=True), "descending"),
@@ -273,19 +275,19 @@ def test_tables_sort(open_page: Open, by: str) -> None:
             page.keyboard.press("Enter")
         assert head.get_attribute("aria-sort") == direction
         for _ in range(50):  # the rows move a moment after the click
-            if [float(one) for one in column(page, number)] == order:
+            if [float(cell) for cell in column(page, number)] == order:
                 break
             page.wait_for_timeout(100)
-        assert [float(one) for one in column(page, number)] == order
+        assert [float(cell) for cell in column(page, number)] == order
 
 
-def test_every_table_can_be_taken_away(open_page: Open) -> None:
-    """The link below a table downloads it as CSV."""
-    page = open_page("index")
+def test_a_table_without_a_file_can_be_downloaded(open_page: Open) -> None:
+    """The link below a table of the prose downloads it as CSV."""
+    page = open_page("choices")
     with page.expect_download() as download:
         page.locator("a.table-csv").first.click()
     text = Path(download.value.path()).read_text(encoding="utf-8")
-    assert text.startswith('"Claim","Verdict"')
+    assert text.startswith('"Choice","Where"')
     assert text.count("\n") == page.locator("table").first.locator("tr").count()
 
 
@@ -298,8 +300,8 @@ def test_the_site_is_light(open_page: Open, site: Path) -> None:
     assert sum(path.stat().st_size for path in every) < 30_000_000
     for name in READ:
         page = open_page(name)
-        loaded = page.evaluate("performance.getEntriesByType('resource').map(one => one.name)")
-        files = {Path(unquote(urlparse(one).path)) for one in loaded if one.startswith("file:")}
+        loaded = page.evaluate("performance.getEntriesByType('resource').map(entry => entry.name)")
+        files = {Path(unquote(urlparse(url).path)) for url in loaded if url.startswith("file:")}
         size = sum(file.stat().st_size for file in files | {site / f"{name}.html"})
         assert size < SMALL, f"{name} weighs {size} bytes"
 

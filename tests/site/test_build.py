@@ -1,18 +1,17 @@
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import nbformat
-import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from replication.files import write_file
+from replication.files import PROJECT, write_file
 from replication.pipeline import execute
-from replication.pipeline.notebook import Notebook, RunError
 from replication.pipeline.run import run_notebooks
 from replication.pipeline.verify import verify_outputs
 from replication.site import build
@@ -21,7 +20,7 @@ from replication.site.build import SiteError, build_site
 CONF = """
 extensions = ["myst_nb"]
 nb_execution_mode = "off"
-exclude_patterns = ["_generated", "source"]
+exclude_patterns = ["figures", "source"]
 """
 INDEX = "# Toy report\n\n{text}\n\n```{{toctree}}\nnotebooks/toy\n```\n"
 
@@ -29,24 +28,20 @@ INDEX = "# Toy report\n\n{text}\n\n```{{toctree}}\nnotebooks/toy\n```\n"
 @pytest.fixture
 def project(toy_project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with a notebook, its published outputs and a page of prose."""
-    monkeypatch.setattr(papermill, "execute_notebook", lambda *_, **__: pytest.fail("executed"))
-    monkeypatch.setattr(build, "_overview", lambda out: {"verdicts": "all\n"})
+    monkeypatch.setattr(build, "_generated", lambda out: {"verdicts": "all of them"})
     write_file(toy_project / "docs" / "conf.py", CONF)
     write_file(toy_project / "docs" / "index.md", INDEX.format(text="Some prose."))
-    write_file(toy_project / "README.md", "[table](figures/toy_table.md)")
     write(toy_project)
     run(toy_project)
+    monkeypatch.setattr(execute, "execute", lambda *_, **__: pytest.fail("executed"))
     return toy_project
 
 
 def write(project: Path, code: str = "x = 1", prose: str = "# A toy") -> Path:
     """Write the notebook."""
     parameters = new_code_cell('out = "x"', metadata={"tags": ["parameters"]})
-    cells = [new_markdown_cell(prose), parameters, new_code_cell(code)]
-    metadata = {
-        "language_info": {"name": "python"},
-        "replication": {"outputs": ["toy_table.csv"]},
-    }
+    cells = [new_markdown_cell(prose), parameters, new_code_cell(code, id="code")]
+    metadata = {"language_info": {"name": "python"}, "replication": {"data": ["trials.csv"]}}
     path = project / "notebooks" / "toy.ipynb"
     path.parent.mkdir(exist_ok=True)
     nbformat.write(new_notebook(cells=cells, metadata=metadata), path)
@@ -73,7 +68,7 @@ def test_nothing_is_executed(project: Path) -> None:
 
 
 def test_a_stale_notebook_stops_the_build(project: Path) -> None:
-    """What is not up to date is named, with the reason and what to do; the old site stays."""
+    """A stale notebook is named, with the reason and what to do; the old site stays."""
     built(project)
     before = (project / "site" / "index.html").read_bytes()
     write(project, code="x = 2")
@@ -81,20 +76,6 @@ def test_a_stale_notebook_stops_the_build(project: Path) -> None:
     with pytest.raises(SiteError, match=f"toy is stale: {why}; first: replicate run toy"):
         built(project)
     assert (project / "site" / "index.html").read_bytes() == before
-
-
-def test_a_failed_notebook_stops_the_build(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a run that failed, there is no site that looks as if nothing had happened."""
-
-    def fail(notebook: Notebook, *_: Any, executed: Path, **__: Any) -> None:
-        write_file(executed, str(nbformat.writes(notebook.load())))
-        raise RunError("it failed")
-
-    monkeypatch.setattr(execute, "execute", fail)
-    with pytest.raises(RunError):
-        run(project, force=True)
-    with pytest.raises(SiteError, match="toy is stale: its last run did not finish"):
-        built(project)
 
 
 def test_a_missing_notebook_stops_the_build(project: Path) -> None:
@@ -161,15 +142,24 @@ def test_a_broken_page_is_named(project: Path) -> None:
     with pytest.raises(SiteError, match=r"the pages cannot be written: index\.md.*nowhere"):
         built(project)
     assert (project / "site" / "index.html").exists()
-    (project / "docs" / "index.md").write_text(INDEX.format(text="mended"))
+    (project / "docs" / "index.md").write_text(INDEX.format(text="fixed"))
     built(project)
 
 
-def test_tables_of_the_readme_are_those_of_the_pages(project: Path) -> None:
-    """A link to a table in a file leads to the table on its page."""
-    built(project)
-    readme = project / "build" / "site-work" / "source" / "_generated" / "readme.md"
-    assert readme.read_text() == "[table](#result-toy-table)"
+def test_what_is_generated_stands_at_its_mark(project: Path) -> None:
+    """A mark in the prose is replaced; links to published tables lead to their place on a page."""
+    text = "<!-- site: verdicts --> [a](../figures/toy/trials.csv) [b](../figures/toy/table1.md)"
+    (project / "docs" / "index.md").write_text(INDEX.format(text=text))
+    pages = build._prose({"verdicts": "all of them"})
+    assert "all of them [a](figures/toy/trials.csv) [b](#result-toy-table1)" in pages["index.md"]
+
+
+def test_every_mark_is_known() -> None:
+    """Each mark in docs/ names something that the site generates."""
+    source = (PROJECT / "replication" / "site" / "build.py").read_text(encoding="utf-8")
+    for path in (PROJECT / "docs").glob("*.md"):
+        for name in re.findall(r"<!-- site: (\w+) -->", path.read_text(encoding="utf-8")):
+            assert f'"{name}": ' in source
 
 
 @pytest.mark.parametrize("there", [True, False])

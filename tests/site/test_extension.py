@@ -55,8 +55,8 @@ def test_tables_sort_and_scroll_by_themselves() -> None:
     assert [cell["scope"] for cell in box.thead.find_all("th")] == ["col", "col"]
 
 
-def test_tables_can_be_taken_away() -> None:
-    """The link below a table holds what the table shows, as CSV."""
+def test_tables_can_be_downloaded() -> None:
+    """The link below a table that has no file holds what the table shows, as CSV."""
     page = improved(("claim", "n"), ('say "hit" &amp; go', "1, 2"), ("<b>bold</b> text", ""))
     link = page.find("a", class_="table-csv")
     assert link["download"] == "table-1.csv"
@@ -66,6 +66,15 @@ def test_tables_can_be_taken_away() -> None:
         ['say "hit" & go', "1, 2"],
         ["bold text", ""],
     ]
+
+
+@pytest.mark.parametrize(("file", "links"), [("claims.csv", 0), ("fig05.svg", 1)])
+def test_tables_with_a_file_have_no_second_one(file: str, links: int) -> None:
+    """Where a CSV file is linked below a table, it gets no link to what it shows."""
+    below = f'<p class="provenance"><a class="download" href="_downloads/{file}">CSV</a></p>'
+    text = f"<div>{table(('a', 'b'), ('1', '2'))}</div>{below}"  # the theme wraps tables
+    page = BeautifulSoup(improve_tables(text), "html.parser")
+    assert len(page.find_all("a", class_="table-csv")) == links
 
 
 def test_tables_without_a_head_stay() -> None:

@@ -17,7 +17,13 @@ from replication.site.overview import choices, citation, interval_plot, publishe
 @pytest.fixture(scope="module")
 def judged() -> pd.DataFrame:
     """Read the stored verdicts."""
-    return read_table(PROJECT / "figures" / "claims.csv")
+    return read_table(PROJECT / "figures" / "claims" / "verdicts.csv")
+
+
+@pytest.fixture(scope="module")
+def holds(judged: pd.DataFrame) -> dict[str, str]:
+    """Say in how many specifications each claim holds."""
+    return {id: f"{at} of 48" for at, id in enumerate(judged["id"].unique())}
 
 
 def rows(text: str) -> list[list[str]]:
@@ -31,36 +37,41 @@ def plot(
 ) -> ET.Element:
     """Draw intervals (effect, low, high) beside the margin 0."""
     table = pd.DataFrame(effects, columns=["effect", "low", "high"])
-    table["F"] = ["printed", "updated"][: len(table)]
+    table["reading"] = ["printed", "updated"][: len(table)]
     return ET.fromstring(
         interval_plot(table.assign(margin=0.0, paper=paper, direction=direction, id="X"))
     )
 
 
-def test_each_verdict_is_that_of_the_file(judged: pd.DataFrame) -> None:
+def test_each_verdict_is_that_of_the_file(judged: pd.DataFrame, holds: dict[str, str]) -> None:
     """A row for each claim that compares, in the file's order, with its own overall verdict."""
     compared = judged[judged["direction"] != "inside"]
-    table = rows(verdicts(judged))
+    table = rows(verdicts(judged, holds))
     parts = [part for _, part in compared.groupby("id", sort=False)]
     assert len(table) == len(parts)
     for row, part in zip(table, parts, strict=True):
         assert row[0] == part["claim"].iloc[0]
-        said = re.match(r"\[\**([\w ]+?)\**( \(.*\)|:.*)?\]\(#result-[\w-]+\)$", row[1])
-        assert said is not None, row[1]
-        assert said[1] == overall(part["verdict"].tolist())
+        link = re.match(
+            r"\[\**([\w ]+?)\**( \(.*\)|:.*)?\]\((#result-|figures/)[\w/.-]+\)$", row[1]
+        )
+        assert link is not None, row[1]
+        assert link[1] == overall(part["verdict"].tolist())
+        assert row[2] == holds[part["id"].iloc[0]]
 
 
-def test_published_numbers_have_rows_of_their_own(judged: pd.DataFrame) -> None:
+def test_published_numbers_have_rows_of_their_own(
+    judged: pd.DataFrame, holds: dict[str, str]
+) -> None:
     """What the first table leaves out is in the second one."""
     ids = judged.groupby("id", sort=False)["direction"].first()
     assert len(rows(published(judged))) == (ids == "inside").sum()
-    assert len(rows(verdicts(judged))) == (ids != "inside").sum()
+    assert len(rows(verdicts(judged, holds))) == (ids != "inside").sum()
 
 
 def test_plots_are_to_scale() -> None:
     """Interval, effect, margin and the paper's effect stand where their sizes say."""
     svg = plot([(-4.0, -6.0, -2.0), (-1.0, -3.0, 1.0)], paper=-5.0)
-    lines = {one.get("class"): one for one in svg.iter("line")}
+    lines = {line.get("class"): line for line in svg.iter("line")}
     margin = float(lines["edge"].get("x1", ""))
     scale = (margin - float(lines["printed"].get("x1", ""))) / 6.0
     assert scale > 0
@@ -76,14 +87,14 @@ def test_plots_are_to_scale() -> None:
 def test_the_claimed_side_is_marked(direction: str, left: bool) -> None:
     """The grey side begins at the margin and reaches the edge at which the claim points."""
     svg = plot([(0.5, -1.0, 1.0)], direction=direction)
-    (side,) = (one for one in svg.iter("rect") if one.get("class") == "claimed")
+    (side,) = (rect for rect in svg.iter("rect") if rect.get("class") == "claimed")
     begin, width = float(side.get("x", "")), float(side.get("width", ""))
-    margin = next(float(one.get("x1", "")) for one in svg.iter("line"))
+    margin = next(float(line.get("x1", "")) for line in svg.iter("line"))
     assert (begin, begin + width) == ((0, margin) if left else (margin, 190))
 
 
-def test_plots_speak(judged: pd.DataFrame) -> None:
-    """Who cannot see a plot hears effect, interval, margin and the paper's effect."""
+def test_plots_have_words() -> None:
+    """The words of a plot name effect, interval, margin and the paper's effect."""
     svg = plot([(-4.0, -6.0, -2.0)], paper=-5.0)
     assert svg.get("role") == "img"
     assert svg.get("aria-label") == "printed F: -4 from -6 to -2. Margin: 0. Paper: -5."
@@ -93,11 +104,11 @@ def test_every_choice_is_described() -> None:
     """Each entry of the register has a row and a section that its id leads to."""
     shares = pd.DataFrame({"claim": ["X", "Y"], "choice": ["ALPHA"] * 2, "share": [0.5, 0.01]})
     text = choices(shares)
-    for one in load_choices().values():
-        assert f"[{one.id}](#choice-{one.id.lower()})" in text
-        assert f"(choice-{one.id.lower()})=\n\n### {one.id}\n" in text
-        assert one.open in text
-        assert one.rule in text
+    for entry in load_choices().values():
+        assert f"[{entry.id}](#choice-{entry.id.lower()})" in text
+        assert f"(choice-{entry.id.lower()})=\n\n### {entry.id}\n" in text
+        assert entry.open in text
+        assert entry.rule in text
     alpha = next(row for row in rows(text) if row[0].startswith("[ALPHA]"))
     assert alpha[-1] == "X (50 %)"
     beta = next(row for row in rows(text) if row[0].startswith("[BETA]"))
@@ -105,9 +116,9 @@ def test_every_choice_is_described() -> None:
 
 
 def test_citation_is_that_of_the_file() -> None:
-    """Authors and title come from CITATION.cff, and a DOI stands there as soon as it has one."""
+    """Authors and title come from CITATION.cff, and so does a DOI as soon as there is one."""
     text = (PROJECT / "CITATION.cff").read_text(encoding="utf-8")
-    said = citation(text)
-    assert "Kao-Shing Hwang and Yi-Chia Tseng" in said
-    assert "no DOI yet" in said
+    without = citation(text)
+    assert "Kao-Shing Hwang and Yi-Chia Tseng" in without
+    assert "no DOI yet" in without
     assert "doi:10.5281/zenodo.1" in citation(text + "doi: 10.5281/zenodo.1\n")

@@ -8,15 +8,16 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from replication.paper.register import load_choices
-from replication.site.pages import Provenance, anchor, link_choices, page
+from replication.site.pages import Origin, anchor, link_choices, link_pages, page
 
 TABLE = "| a   | b   |\n| --- | --- |\n| 1   | 2   |\n"
-CAME = Provenance("toy", {"seed": 7, "trials": 3, "choices": {}, "jobs": 2}, 12.4, "Linux, 2 cores")
+ORIGIN = Origin("toy", {"seed": 7, "trials": 3, "choices": {}, "jobs": 2}, 12.4, "Linux, 2 cores")
 
 
-def shown(text: str) -> Any:
-    """Return an output of a cell in Markdown."""
-    return new_output("execute_result", {"text/markdown": text}, execution_count=1)
+def shown(data: dict[str, str], **known: str) -> Any:
+    """Return an output of a cell; what is known of it stands in its metadata."""
+    metadata = {"replication": known} if known else {}
+    return new_output("execute_result", data, metadata=metadata, execution_count=1)
 
 
 @pytest.fixture
@@ -30,62 +31,66 @@ def folder(tmp_path: Path) -> Path:
 
 
 def made(folder: Path, *outputs: Any, code: str = "x", text: str = "# Toy") -> Any:
-    """Return the page of a notebook with a text and one cell."""
+    """Return the page of a published notebook with a text and one cell."""
     cells = [new_markdown_cell(text), new_code_cell(code, outputs=list(outputs))]
-    nbformat.write(new_notebook(cells=cells), folder / "toy.ipynb")
-    node = nbformat.from_dict(page(folder / "toy.ipynb", folder, CAME))
+    nbformat.write(new_notebook(cells=cells), folder / "notebook.ipynb")
+    node = nbformat.from_dict(page(folder / "notebook.ipynb", ORIGIN))
     nbformat.validate(node)
     return node
 
 
-def test_a_figure_says_what_one_sees_and_where_it_is_from(folder: Path) -> None:
+def test_a_figure_is_described_and_traced(folder: Path) -> None:
     """Its words are alternative text and caption; run, files, notebook and code stand below."""
-    code = (
-        'shown.figure(\n    figures.error_figure(errors), "fig05", alt=panels.describe_errors(x))'
-    )
-    node = made(folder, shown(r"![d falls \[to 0\]](fig05.png)"), code=code)
+    words, code = "d falls [to 0]\nat once", "replication.report.curves.draw_errors"
+    figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt=words, code=code)
+    node = made(folder, figure)
+    assert node.cells[1].outputs == []
     text = node.cells[2].source
-    assert "{figure} ../figures/fig05.png" in text
-    assert f":name: {anchor('fig05')}" in text
-    assert ":alt: d falls [to 0]" in text
-    assert "\n\nd falls \\[to 0\\]\n\n" in text
-    assert "seed = 7, trials = 3 · run time of the notebook: 12 s on Linux, 2 cores" in text
+    assert "{figure} ../figures/toy/fig05.png" in text
+    assert text.startswith(f"({anchor('toy', 'fig05')})=\n\n````")
+    assert ":alt: d falls [to 0] at once\n" in text
+    assert "\n\nd falls \\[to 0\\] at once\n\n" in text
+    assert "seed = 7, trials = 3 · the notebook ran 12 s on Linux, 2 cores" in text
     for name in ("fig05.csv", "fig05.svg"):
-        assert f"<../figures/{name}>`" in text
+        assert f"<../figures/toy/{name}>`" in text
     assert "`notebook <../source/toy.ipynb>`" in text
-    assert text.rstrip("`\n").endswith("code: {py:func}`~replication.report.figures.error_figure")
-
-
-def test_code_behind_a_function_of_the_notebook_is_named(folder: Path) -> None:
-    """Where a cell draws through a function of an earlier cell, that one's code counts."""
-    cells = [
-        new_code_cell("def draw():\n    return figures.error_figure(1)"),
-        new_code_cell("draw()", outputs=[shown("![falls](fig05.png)")]),
-    ]
-    nbformat.write(new_notebook(cells=cells), folder / "toy.ipynb")
-    text = page(folder / "toy.ipynb", folder, CAME)["cells"][-1]["source"]
-    assert "{py:func}`~replication.report.figures.error_figure`" in text
+    assert text.rstrip("`\n").endswith(f"code: {{py:func}}`~{code}")
 
 
 def test_a_table_has_its_file(folder: Path) -> None:
-    """A table that was published is shown as it is, with its full numbers to take away."""
-    text = made(folder, shown(TABLE)).cells[2].source
-    assert text.startswith(f"({anchor('table1')})=\n\n{TABLE}")
-    assert "`CSV <../figures/table1.csv>`" in text
+    """A table is shown as it is, with its full numbers as a file."""
+    text = (
+        made(folder, shown({"text/markdown": TABLE}, kind="table", name="table1")).cells[2].source
+    )
+    assert text.startswith(f"({anchor('toy', 'table1')})=\n\n{TABLE}")
+    assert "`CSV <../figures/toy/table1.csv>`" in text
+    assert "SVG" not in text
+
+
+def test_a_name_is_a_place_once(folder: Path) -> None:
+    """A figure and a table of one name are both shown; links lead to the first of them."""
+    figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt="it falls")
+    table = shown({"text/markdown": TABLE}, kind="table", name="fig05")
+    cells = made(folder, figure, table).cells
+    assert anchor("toy", "fig05") in cells[2].source
+    assert anchor("toy", "fig05") not in cells[3].source
+    assert cells[3].source.startswith(TABLE)
 
 
 def test_a_player_is_part_of_the_page(folder: Path) -> None:
-    """A link to a player becomes the player itself."""
-    text = made(folder, shown("[film.html](film.html)")).cells[2].source
-    assert ":file: ../figures/film.html" in text
-    assert "`CSV <../figures/film.csv>`" in text
+    """The link that a published notebook has instead of a player becomes the player itself."""
+    link = {"text/markdown": "[film.html](film.html)"}
+    text = made(folder, shown(link, kind="player", name="film", alt="it moves")).cells[2].source
+    assert ":file: ../figures/toy/film.html" in text
+    assert "[film.html]" not in text
+    assert "`CSV <../figures/toy/film.csv>`" in text
 
 
 def test_other_outputs_stay(folder: Path) -> None:
-    """Text that a cell prints stays with it; what it says in Markdown becomes text of the page."""
+    """Printed text stays with its cell; Markdown without a name becomes text of the page."""
     printed = new_output("stream", name="stdout", text="said")
-    node = made(folder, printed, shown("**open:** ALPHA"))
-    assert ["".join(one.text) for one in node.cells[1].outputs] == ["said"]
+    node = made(folder, printed, shown({"text/markdown": "**open:** ALPHA"}))
+    assert ["".join(output.text) for output in node.cells[1].outputs] == ["said"]
     assert node.cells[2].source == "**open:** [ALPHA](#choice-alpha)"
 
 
@@ -96,10 +101,10 @@ def test_code_is_there_but_hidden(folder: Path) -> None:
     assert node.cells[1].metadata.tags == ["hide-input"]
 
 
-def test_unknown_run_times_are_said_to_be_unknown() -> None:
-    """Where a run is not known, as in a fresh clone, its time is not made up."""
-    line = Provenance("toy", {"seed": 7}).line([], "")
-    assert "seed = 7 · run time of the notebook: not recorded here" in line
+def test_an_unknown_run_time_is_left_out(tmp_path: Path) -> None:
+    """Where no run is recorded, as in a fresh clone, no time is shown."""
+    line = Origin("toy", {"seed": 7}).line(tmp_path, "fig05")
+    assert line == "seed = 7 · {download}`notebook <../source/toy.ipynb>`"
 
 
 def test_every_choice_is_linked_once() -> None:
@@ -109,3 +114,18 @@ def test_every_choice_is_linked_once() -> None:
         assert link_choices(f"`{id}` [{id}](#x) {id}-OTHER X{id}") == (
             f"`{id}` [{id}](#x) {id}-OTHER X{id}"
         )
+
+
+@pytest.mark.parametrize(
+    ("link", "target"),
+    [
+        ("../figures/claims/verdicts.md", "#result-claims-verdicts"),
+        ("../figures/claims/notebook.ipynb", "notebooks/claims.ipynb"),
+        ("../figures/claims/verdicts.csv", "figures/claims/verdicts.csv"),
+        ("../CITATION.cff", "CITATION.cff"),
+        ("choices.md#f-index", "choices.md#f-index"),
+    ],
+)
+def test_links_of_docs_lead_to_pages(link: str, target: str) -> None:
+    """A published table or notebook is a place on the site, any other file a file of it."""
+    assert link_pages(f"see [this]({link}).") == f"see [this]({target})."
