@@ -232,7 +232,9 @@ def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
     return readable(
         table,
         {
-            "Setting": lambda row: row.setting,
+            "Method": lambda row: get_method(row.method).label,
+            "Reading": lambda row: F_LABELS[row.reading],
+            "Choices": lambda row: row.choices,
             "Mean [95 %]": interval("mean", "low", "high"),
             "SD": number("sd"),
             "Median": lambda row: f"{row.median:g}",
