@@ -13,7 +13,9 @@ from replication.report.players import Player
 
 def published(shown: Shown) -> tuple[dict[str, object], dict[str, object]]:
     """Return what Jupyter would store of an output: its data, and our metadata."""
-    data, metadata = InteractiveShell.instance().display_formatter.format(shown)
+    formatter = InteractiveShell.instance().display_formatter
+    assert formatter is not None
+    data, metadata = formatter.format(shown)
     return data, metadata["replication"]
 
 
