@@ -1,8 +1,8 @@
 """Many trials of many conditions, in parallel, each computed once.
 
-Trial k of every condition descends from child k of one root seed, so conditions are compared trial by
-trial. A trial's bits depend on its condition and seed alone: not on the number of workers, on the
-trials that it is computed together with, or on whether it was computed now or read from the store.
+Trial k of every condition descends from child k of one root seed, so conditions are compared trial
+by trial. A trial's bits depend on its condition and seed alone: not on the number of workers, on
+the trials that it is computed with, or on whether it was computed now or read from the store.
 """
 
 from __future__ import annotations
