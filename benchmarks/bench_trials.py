@@ -23,7 +23,7 @@ def test_workers_and_memory(tmp_path: Path) -> None:
         store = Store(tmp_path / name)
         results = run_trials([condition], trials=trials, store=store, jobs=jobs, seed=1)
         seconds = time.perf_counter() - began
-        steps = float(results.frame()["steps"].sum())
+        steps = sum(results.trial(condition, k).steps for k in range(trials))
         peak = max(
             resource.getrusage(who).ru_maxrss / 1024
             for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)

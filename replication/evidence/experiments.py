@@ -1,4 +1,4 @@
-"""What the notebooks compare: the conditions behind each figure and table."""
+"""The design of the experiments: the conditions that stand behind each figure and table."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
+
 from replication.demos.files import load_demos
 from replication.demos.model import Demos
+from replication.errors import unknown
 from replication.files import resolve
 from replication.irl import METHODS, READINGS, get_method
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
 from replication.paper.register import ChoiceError, load_choices
 from replication.trials.condition import Condition
+from replication.trials.measures import factors
 
 F_LABELS = {"": "–", "printed": "Fᵢ (printed)", "updated": "Fᵢ₊₁ (updated)"}
-"""How an F index reads in tables and figures; a method without a trace has none."""
+"""How a reading of Eq. 9 is called in tables and figures; a method without a trace has none."""
 
 SETS = (
     "none",
@@ -32,13 +36,16 @@ SETS = (
 )
 """The sets of incorrect demonstrations that stand beside the default (INCORRECT-KINDS)."""
 
+SETS_METHOD = "unified-incorrect"
+"""The method that is given each set; the empty set stands for its baseline."""
+
 Key = tuple[str, str]
-"""Method, and F index; the F index is empty for a method without a trace."""
+"""Method, and reading of Eq. 9; the reading is empty for a method without a trace."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """One of the paper's experiments: its demonstrations, its own parameters and its methods."""
+    """One of the paper's experiments: the file of its demonstrations, its choices, its methods."""
 
     demos: str
     choices: Mapping[str, Any]
@@ -47,6 +54,11 @@ class Experiment:
     def conditions(self) -> dict[Key, Condition]:
         """Return the conditions that stand behind its figures and tables."""
         return method_conditions(load_demos(resolve(self.demos)), self.choices, self.methods)
+
+    @property
+    def set(self) -> str:
+        """The set of incorrect demonstrations that its methods are given."""
+        return Params.of(**self.choices).demonstrations.incorrect
 
 
 EXPERIMENTS = {
@@ -73,11 +85,11 @@ def method_conditions(
     """
     if "f_index" in choices:
         raise ChoiceError("choices: f_index is run both ways; leave it out")
-    names = list(methods)
-    keys = [(name, f) for f in ("", *READINGS) for name in names if f in get_method(name).readings]
     return {
-        (name, f): Condition(demos, name, Params.of(**choices, **({"f_index": f} if f else {})))
-        for name, f in keys
+        (name, reading): Condition(demos, name, _params(choices, reading))
+        for reading in ("", *READINGS)
+        for name in methods
+        if reading in get_method(name).readings
     }
 
 
@@ -93,20 +105,56 @@ def rule_conditions(demos: Demos, choices: Mapping[str, Any]) -> dict[str, Condi
 def set_conditions(
     demos: Demos, choices: Mapping[str, Any], sets: Iterable[str] = SETS
 ) -> dict[Key, Condition]:
-    """Return a condition for each set of incorrect demonstrations; keys are set and F index.
+    """Return a condition for each set of incorrect demonstrations, by set and reading of Eq. 9.
 
     Sets with a kind that the demonstrations lack are left out; demonstrations of other kinds than
-    ours form one set. The empty set is the unified method without incorrect demonstrations.
+    ours form one set.
     """
-    formed = [one for one in sets if one == "none" or set(one.split("+")) <= set(demos.kinds)]
-    if formed == ["none"] and demos.kinds:
-        formed.append("all")
-    found = {}
-    for kinds in formed:
-        method = "unified" if kinds == "none" else "unified-incorrect"
-        # The method without incorrect demonstrations keeps the default's name, and so its trials.
-        chosen = {} if kinds == "none" else {"incorrect": kinds}
-        for f in READINGS:
-            params = Params.of(**{**choices, **chosen}, f_index=f)
-            found[kinds, f] = Condition(demos, method, params)
-    return found
+    names = [name for name in sets if name == "none" or {*name.split("+")} <= {*demos.kinds}]
+    if names == ["none"] and demos.kinds:
+        names.append("all")
+    return {
+        (name, reading): Condition(
+            demos,
+            get_method(SETS_METHOD).baseline if name == "none" else SETS_METHOD,
+            _params(choices, reading, name),
+        )
+        for name in names
+        for reading in READINGS
+    }
+
+
+def condition_of(task: str, method: str, reading: str, set: str) -> Condition:
+    """Return the condition whose :func:`replication.trials.measures.factors` these are.
+
+    Raises
+    ------
+    ChoiceError
+        If the experiments have no such condition.
+    """
+    if task not in EXPERIMENTS:
+        raise ChoiceError(unknown(task, EXPERIMENTS, "task"))
+    experiment = EXPERIMENTS[task]
+    params = _params(experiment.choices, reading, set)
+    condition = Condition(load_demos(resolve(experiment.demos)), method, params)
+    if factors(condition) != {"task": task, "method": method, "reading": reading, "set": set}:
+        raise ChoiceError(f"{task}: {method} has no reading {reading!r} with the set {set!r}")
+    return condition
+
+
+def _params(choices: Mapping[str, Any], reading: str, set: str = "none") -> Params:
+    # A method without incorrect demonstrations keeps the default, by which its errors are counted.
+    chosen = {"f_index": reading} if reading else {}
+    chosen |= {} if set == "none" else {"incorrect": set}
+    return Params.of(**{**choices, **chosen})
+
+
+def main_trials(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the experiments' own conditions, without the other sets."""
+    default = trials["task"].map({task: each.set for task, each in EXPERIMENTS.items()})
+    return trials[(trials["set"] == "none") | (trials["set"] == default)]
+
+
+def under(rows: pd.DataFrame, reading: str) -> pd.DataFrame:
+    """Return the rows under a reading of Eq. 9; a method without a trace counts under both."""
+    return rows[rows["reading"].isin(("", reading))]

@@ -74,7 +74,7 @@ def effects_table(
         What to evaluate; a specification without a claim's methods gives no row.
     """
     measured = {
-        specification: measure_trials(results, own).groupby("method")
+        specification: measure_trials(results, own.values()).groupby("method")
         for specification, own in conditions.items()
     }
     parts = []

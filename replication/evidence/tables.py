@@ -348,7 +348,7 @@ def read_table(path: Path) -> pd.DataFrame:
     """Read a table that was written as CSV; what is empty is NaN in columns of numbers only."""
     table = pd.read_csv(path, keep_default_na=False, na_values=[""])
     for name in table:
-        if table[name].dtype.kind not in "fiub" or name == "F":
+        if table[name].dtype.kind not in "fiub" or name in ("F", "reading"):
             table[name] = table[name].astype(object).where(table[name].notna(), "")
     return table
 

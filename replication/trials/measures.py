@@ -1,10 +1,9 @@
-"""What one trial says about the paper's claims; ``claims.toml`` explains each measure."""
+"""The measures of each trial on which claims are judged; ``claims.toml`` explains them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +17,7 @@ from replication.irl.expectations import visited
 from replication.paper.published import FIGURE_12, TABLE_1
 from replication.paper.register import Chosen, choice
 from replication.trials.condition import Condition
-from replication.trials.results import Results
+from replication.trials.results import Results, digest
 
 
 @dataclass(frozen=True)
@@ -37,22 +36,44 @@ DIGITS = 8
 
 
 def measure_trials(
-    results: Results, conditions: Mapping[Any, Condition], report: Report | None = None
+    results: Results, conditions: Iterable[Condition], report: Report | None = None
 ) -> pd.DataFrame:
-    """Return every measure of every trial: one row a trial.
+    """Return the table of some conditions' trials, one row a trial: what ``trials.csv`` holds.
 
-    The columns before the measures are `task`, `method`, `F` and `trial`; `F` is the reading of
-    Eq. 9, empty for a method without a trace. `conditions` are keyed by method and F index.
+    The columns are those of :func:`factors`, `trial`, `seed`, those of :func:`measure`, `steps` (of
+    the environment) and `digest`. A condition that is given twice has its rows once.
     """
     report = report or Report()
     rows = []
-    for (method, f), condition in conditions.items():
+    for condition in conditions:
         marked = marked_pairs(shown_demos(condition))
         for k in range(results.trials):
             trial = results.trial(condition, k)
-            key = {"task": condition.demos.task, "method": method, "F": f, "trial": k}
-            rows.append(key | measure(trial, condition.demos, marked, report))
-    return pd.DataFrame(rows)
+            rows.append(
+                factors(condition)
+                | {"trial": k, "seed": results.seed}
+                | measure(trial, condition.demos, marked, report)
+                | {"steps": trial.steps, "digest": digest(trial)}
+            )
+    return pd.DataFrame(rows).drop_duplicates(ignore_index=True)
+
+
+def factors(condition: Condition) -> dict[str, str]:
+    """Return what tells a condition from the others of its experiment.
+
+    Returns
+    -------
+    dict
+        `task`; `method`; `reading` of Eq. 9, empty for a method without a trace; `set` of incorrect
+        demonstrations that the method is given, "none" if it uses none.
+    """
+    method, params = condition.rule, condition.params
+    return {
+        "task": condition.demos.task,
+        "method": condition.method,
+        "reading": params.update.f_index if params.update.f_index in method.readings else "",
+        "set": params.demonstrations.incorrect if method.uses_incorrect else "none",
+    }
 
 
 def measure(
@@ -111,8 +132,8 @@ def early_errors(trial: Trial, marked: NDArray[np.bool_], early: int) -> int:
     has converged by then makes no more.
     """
     return sum(
-        int((one.hits | marked[one.states[:-1], one.actions]).sum())
-        for one in trial.episodes[1 : early + 1]
+        int((episode.hits | marked[episode.states[:-1], episode.actions]).sum())
+        for episode in trial.episodes[1 : early + 1]
     )
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from replication.irl import Trial
@@ -17,69 +16,68 @@ from replication.trials.store import DamagedTrialError, Store
 
 
 class Results:
-    """The trials of some conditions, read from the store when they are asked for."""
+    """The trials of some conditions, read from the store when they are asked for.
+
+    Attributes
+    ----------
+    conditions, trials, seed
+        Trials 0 ... `trials` - 1 of each condition, from this root seed.
+    """
 
     def __init__(
         self,
         store: Store,
         conditions: Sequence[Condition],
         trials: int,
-        root: int,
+        seed: int,
         *,
         traced: bool = True,
     ) -> None:
         self._store = store
-        self._root = root
         self._traced = traced
+        self._known: dict[str, tuple[NDArray[np.float64], bool]] = {}
+        self.seed = seed
         self.trials = trials
         self.conditions = list(conditions)
 
     def trial(self, condition: Condition, k: int, *, snapshots: bool = False) -> Trial:
         """Return trial `k` of a condition; one that was damaged in the store is computed again."""
-        key = trial_key(condition, self._root, k, traced=self._traced)
+        key = self._key(condition, k)
         try:
-            return self._store.get(key, snapshots=snapshots)
+            trial = self._store.get(key, snapshots=snapshots)
         except DamagedTrialError:
             self._store.drop(key)
             self._store.put(
-                compute(condition.agent, [(condition, k)], self._root, traced=self._traced)
+                compute(condition.agent, [(condition, k)], self.seed, traced=self._traced)
             )
-            return self._store.get(key, snapshots=snapshots)
+            trial = self._store.get(key, snapshots=snapshots)
+        self._known[key] = trial.errors, trial.converged
+        return trial
+
+    def _key(self, condition: Condition, k: int) -> str:
+        return trial_key(condition, self.seed, k, traced=self._traced)
 
     def errors(self, condition: Condition) -> NDArray[np.float64]:
         """Return d of every trial, `[trial, iteration]`; after its end a trial keeps its last d."""
-        curves = [self.trial(condition, k).errors for k in range(self.trials)]
+        curves = [curve for curve, _ in self._outcomes(condition)]
         longest = max(map(len, curves))
         return np.array([np.pad(d, (0, longest - len(d)), mode="edge") for d in curves])
 
     def iterations(self, condition: Condition) -> NDArray[np.int64]:
         """Return the number of iterations of every trial, `[trial]`."""
-        return np.array([self.trial(condition, k).iterations for k in range(self.trials)])
+        return np.array([len(curve) - 1 for curve, _ in self._outcomes(condition)])
 
     def converged(self, condition: Condition) -> NDArray[np.bool_]:
         """Return whether each trial converged, `[trial]`."""
-        return np.array([self.trial(condition, k).converged for k in range(self.trials)])
+        return np.array([converged for _, converged in self._outcomes(condition)])
 
-    def frame(self) -> pd.DataFrame:
-        """Return tidy trials, one row for each trial of each condition."""
-        rows = []
-        for condition in self.conditions:
-            for k in range(self.trials):
-                trial = self.trial(condition, k)
-                rows.append(
-                    {
-                        "task": condition.demos.task,
-                        "method": condition.method,
-                        "trial": k,
-                        "seed": self._root,
-                        "iterations": trial.iterations,
-                        "converged": trial.converged,
-                        "steps": trial.steps,
-                        "choices": condition.choices,
-                        "digest": digest(trial),
-                    }
-                )
-        return pd.DataFrame(rows)
+    def _outcomes(self, condition: Condition) -> list[tuple[NDArray[np.float64], bool]]:
+        """Return the errors of every trial, and whether it converged; each is read once."""
+        keys = [self._key(condition, k) for k in range(self.trials)]
+        for k, key in enumerate(keys):
+            if key not in self._known:
+                self.trial(condition, k)
+        return [self._known[key] for key in keys]
 
 
 def digest(trial: Trial) -> str:
@@ -87,8 +85,8 @@ def digest(trial: Trial) -> str:
     parts: list[NDArray[Any]] = [trial.errors, trial.weights, trial.q, trial.values]
     parts += [part for episode in trial.episodes for part in episode]
     head = [bool(trial.converged), int(trial.steps), *(part.shape for part in parts)]
-    found = hashlib.sha256(repr(head).encode())
+    sha256 = hashlib.sha256(repr(head).encode())
     for part in parts:
-        found.update(part.tobytes())
+        sha256.update(part.tobytes())
     # The prefix keeps readers of CSV from taking digits for a number.
-    return f"sha256:{found.hexdigest()[:16]}"
+    return f"sha256:{sha256.hexdigest()[:16]}"

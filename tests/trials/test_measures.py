@@ -2,8 +2,10 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +15,7 @@ from scipy import stats
 from replication import Demos, Params, load_demos
 from replication.envs.maze import as_maze
 from replication.evidence.experiments import EXPERIMENTS, method_conditions
+from replication.evidence.tables import read_table, write_csv
 from replication.files import resolve
 from replication.irl import Trial
 from replication.irl.agent import Episode
@@ -27,7 +30,7 @@ from replication.trials.measures import (
     shown_demos,
     slope,
 )
-from replication.trials.results import Results
+from replication.trials.results import Results, digest
 from replication.trials.run import run_trials
 from replication.trials.store import Store
 
@@ -234,25 +237,44 @@ def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Res
 
 
 def test_there_is_a_row_for_each_trial_and_method(small_demos: Demos, results: Results) -> None:
-    """Rows are keyed by task, method, reading of Eq. 9 and trial; AdaBoost-IRL has no reading."""
+    """Rows are keyed by task, method, reading, set and trial, and end with steps and digest."""
     conditions = method_conditions(small_demos, FEW)
-    table = measure_trials(results, conditions)
-    assert table.columns.tolist() == ["task", "method", "F", "trial", *NAMES]
-    due = [("small", method, f, k) for method, f in conditions for k in range(3)]
-    keys = table[["task", "method", "F", "trial"]].itertuples(index=False, name=None)
-    assert list(keys) == due
+    table = measure_trials(results, conditions.values())
+    keys = ["task", "method", "reading", "set", "trial"]
+    assert table.columns.tolist() == [*keys, "seed", *NAMES, "steps", "digest"]
+    sets = {"adaboost": "none", "unified": "none", "unified-incorrect": "hit+detour"}
+    expected = [("small", name, f, sets[name], k) for name, f in conditions for k in range(3)]
+    assert list(table[keys].itertuples(index=False, name=None)) == expected
+    assert set(table["seed"]) == {2}
     for (method, f), condition in conditions.items():
-        own = table[(table["method"] == method) & (table["F"] == f)]
-        assert own["iterations"].tolist() == results.iterations(condition).tolist()
-        assert own["converged"].tolist() == results.converged(condition).astype(int).tolist()
-    assert set(table[table["method"] == "adaboost"]["F"]) == {""}
+        rows = table[(table["method"] == method) & (table["reading"] == f)]
+        assert rows["iterations"].tolist() == results.iterations(condition).tolist()
+        assert rows["converged"].tolist() == results.converged(condition).astype(int).tolist()
+        trials = [results.trial(condition, k) for k in range(3)]
+        assert rows["steps"].tolist() == [trial.steps for trial in trials]
+        assert rows["digest"].tolist() == [digest(trial) for trial in trials]
+    assert set(table[table["method"] == "adaboost"]["reading"]) == {""}
+
+
+def test_no_row_stands_twice(small_demos: Demos, results: Results) -> None:
+    """A condition of the sets that is a main condition, too, has its rows once."""
+    conditions = [*method_conditions(small_demos, FEW).values()]
+    table = measure_trials(results, conditions)
+    assert measure_trials(results, [*conditions, *conditions[1:3]]).equals(table)
+
+
+def test_trials_survive_their_file(small_demos: Demos, results: Results, tmp_path: Path) -> None:
+    """What is written to trials.csv reads back as the same table, bit by bit."""
+    table = measure_trials(results, method_conditions(small_demos, FEW).values())
+    read = read_table(write_csv(table, tmp_path / "trials.csv"))
+    pd.testing.assert_frame_equal(table, read, check_dtype=False, check_exact=True)
 
 
 def test_report_reaches_every_trial(small_demos: Demos, results: Results) -> None:
     """A longer initial phase has no fewer errors, and the growth is from the given mid-term."""
     conditions = method_conditions(small_demos, FEW)
     usual, other = (
-        measure_trials(results, conditions, report)
+        measure_trials(results, conditions.values(), report)
         for report in (None, Report(early=0.5, mid_term=0.75))
     )
     assert (other["early_errors"] >= usual["early_errors"]).all()
@@ -264,7 +286,7 @@ def test_report_reaches_every_trial(small_demos: Demos, results: Results) -> Non
 def test_setting_without_demonstrations_counts_hits(small_demos: Demos, results: Results) -> None:
     """Where no incorrect demonstrations are chosen, the measured errors are hits alone."""
     condition = Condition(small_demos, "unified", Params.of(**FEW, incorrect="none"))
-    own = measure_trials(results, {("unified", "printed"): condition})
+    own = measure_trials(results, [condition])
     for k, errors in enumerate(own["early_errors"]):
         episodes = results.trial(condition, k).episodes[1:11]
         assert errors == sum(int(one.hits.sum()) for one in episodes)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from replication import Demos
@@ -134,28 +133,6 @@ def test_finished_trials_are_not_computed_again(
     assert computed == [[4]]
 
 
-def test_frame_has_one_row_a_trial(small_demos: Demos, store_path: Path) -> None:
-    """The tidy table has every trial once, with what was asked for and what came out."""
-    results = _run(small_demos, store_path)
-    frame = results.frame()
-    assert list(frame.columns) == [
-        "task",
-        "method",
-        "trial",
-        "seed",
-        "iterations",
-        "converged",
-        "steps",
-        "choices",
-        "digest",
-    ]
-    assert len(frame) == 12
-    assert not frame.duplicated(["method", "trial"]).any()
-    assert set(frame["choices"]) == {"EPISODES=60 HORIZON=40 ITERATION-CAP=40"}
-    condition = results.conditions[0]
-    assert frame["iterations"].tolist()[:4] == results.iterations(condition).tolist()
-
-
 def test_errors_are_filled_up_with_their_last(small_demos: Demos, store_path: Path) -> None:
     """Error curves of unequal length keep the last error: zero if converged, else not."""
     short, long = (
@@ -171,11 +148,24 @@ def test_errors_are_filled_up_with_their_last(small_demos: Demos, store_path: Pa
 
 
 def test_a_capped_trial_is_marked(small_demos: Demos, store_path: Path) -> None:
-    """A trial that ended at the cap is in the table with the cap, and not converged."""
+    """A trial that ended at the cap has as many iterations, and has not converged."""
     capped = Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 2}))
-    frame = run_trials([capped], trials=2, store=Store(store_path), seed=5).frame()
-    assert frame["converged"].tolist() == [False, False]
-    assert frame["iterations"].tolist() == [2, 2]
+    results = run_trials([capped], trials=2, store=Store(store_path), seed=5)
+    assert results.converged(capped).tolist() == [False, False]
+    assert results.iterations(capped).tolist() == [2, 2]
+
+
+def test_outcomes_are_read_once(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors, iterations and convergence of a trial that was read do not read it again."""
+    results = _run(small_demos, store_path)
+    condition = results.conditions[0]
+    counts = [results.trial(condition, k).iterations for k in range(results.trials)]
+    monkeypatch.setattr(Store, "get", None)
+    assert results.iterations(condition).tolist() == counts
+    assert results.converged(condition).all()
+    assert results.errors(condition).shape == (results.trials, max(counts) + 1)
 
 
 def test_only_the_declared_trial_keeps_snapshots(small_demos: Demos, store_path: Path) -> None:
@@ -225,7 +215,7 @@ def test_equal_settings_are_run_once(small_demos: Demos, store_path: Path) -> No
     """A condition that is given twice appears once in the results."""
     condition = Condition(small_demos, "unified", Params.of(**FEW))
     results = run_trials([condition, condition], trials=2, store=Store(store_path), seed=1)
-    assert len(results.frame()) == 2
+    assert results.conditions == [condition]
 
 
 def test_a_damaged_trial_is_computed_again(small_demos: Demos, store_path: Path) -> None:
@@ -316,11 +306,3 @@ def test_digests_are_those_of_the_store(small_demos: Demos, store_path: Path) ->
     ((key, trial),) = compute_module.compute(condition.agent, [(condition, 1)], 5)
     _run(small_demos, store_path)
     assert digest(Store(store_path).get(key)) == digest(trial)
-
-
-def test_frame_survives_csv(small_demos: Demos, store_path: Path, tmp_path: Path) -> None:
-    """What is written to trials.csv reads back as the same table."""
-    frame = _run(small_demos, store_path).frame()
-    frame.to_csv(tmp_path / "trials.csv", index=False)
-    read = pd.read_csv(tmp_path / "trials.csv", keep_default_na=False)
-    pd.testing.assert_frame_equal(frame, read, check_dtype=False)
