@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from replication.evidence.claims import Claim, ClaimError, Claims, Judging, criteria_hash
-from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.experiments import main_trials, under
 from replication.evidence.statistics import (
     compare,
     holm,
@@ -19,8 +19,6 @@ from replication.evidence.statistics import (
     share_interval,
     summarise,
 )
-from replication.irl import get_method
-from replication.paper.register import load_choices
 
 REPRODUCED = "reproduced"
 PARTLY = "partly"
@@ -40,18 +38,8 @@ def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:
     judging
         How many trials of each task are judged.
     """
-    keys = trials[["task", "method", "set", "trial"]].itertuples(index=False, name=None)
-    counted: dict[str, int] = dict(judging.trials)
-    chosen = [k < counted.get(task, 0) and kinds == main_set(task, x) for task, x, kinds, k in keys]
-    return trials[chosen]
-
-
-def main_set(task: str, method: str) -> str:
-    """Return the set of incorrect demonstrations that a method is given in the main conditions."""
-    if not get_method(method).uses_incorrect:
-        return "none"
-    default = load_choices()["INCORRECT-KINDS"].default
-    return str(EXPERIMENTS[task].choices.get("incorrect", default))
+    main = main_trials(trials)
+    return main[main["trial"] < main["task"].map(dict(judging.trials))]
 
 
 def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
@@ -256,9 +244,7 @@ def _trials_of(measures: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
 
 def _paired(measures: pd.DataFrame, task: str, method: str, reading: str) -> pd.DataFrame:
     """Return a method's trials in order; without a trace it has the same under each reading."""
-    rows = _trials_of(measures, task, method)
-    used = reading if reading in set(rows["reading"]) else ""
-    return rows[rows["reading"] == used].sort_values("trial")
+    return under(_trials_of(measures, task, method), reading).sort_values("trial")
 
 
 def by_claim(table: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:
