@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -24,6 +24,7 @@ from replication.paper.published import Published
 TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
 Reading = Literal["printed", "updated"]
 Measure = Literal["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
+MEASURES: tuple[str, ...] = get_args(Measure)
 Statistic = Literal[
     "mean-difference",
     "sd-ratio",
