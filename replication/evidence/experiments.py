@@ -19,9 +19,6 @@ from replication.paper.register import ChoiceError, load_choices
 from replication.trials.condition import Condition
 from replication.trials.measures import factors
 
-F_LABELS = {"": "–", "printed": "Fᵢ (printed)", "updated": "Fᵢ₊₁ (updated)"}
-"""How a reading of Eq. 9 is called in tables and figures; a method without a trace has none."""
-
 SETS = (
     "none",
     "hit",

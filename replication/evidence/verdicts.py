@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from replication.evidence.claims import Claim, ClaimError, Claims, Judging, criteria_hash
-from replication.evidence.experiments import main_trials, under
+from replication.evidence.experiments import EXPERIMENTS, main_trials, under
 from replication.evidence.statistics import (
     compare,
     holm,
@@ -19,6 +20,7 @@ from replication.evidence.statistics import (
     share_interval,
     summarise,
 )
+from replication.evidence.tables import read_table
 
 REPRODUCED = "reproduced"
 PARTLY = "partly"
@@ -28,13 +30,19 @@ NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable"
 
 
+def read_trials(figures: Path) -> pd.DataFrame:
+    """Return the tables ``trials.csv`` of all experiments, one below the other."""
+    folders = [figures / task.replace("-", "_") for task in EXPERIMENTS]
+    return pd.concat([read_table(folder / "trials.csv") for folder in folders], ignore_index=True)
+
+
 def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:
     """Return the trials that count: those of the main conditions, as many as are to be judged.
 
     Parameters
     ----------
     trials
-        The tables ``trials.csv`` of all experiments, one below the other.
+        Of :func:`read_trials`, or one of the tables.
     judging
         How many trials of each task are judged.
     """

@@ -45,3 +45,9 @@ SOCCER_CURVES = {
 
 MOVES = {"open-maze": 31, "obstacle-maze": 33}
 """Steps of the correct demonstration (sections IV-A and IV-B)."""
+
+PUBLISHED = {"open-maze": TABLE_1, "obstacle-maze": TABLE_2, "soccer": SOCCER_CURVES}
+"""Iterations by task and method."""
+
+PUBLISHED_CURVES = {"open-maze": FIGURE_5, "soccer": FIGURE_12}
+"""Iterations after which a drawn error is zero, by task and method."""

@@ -16,7 +16,6 @@ from scipy import stats
 
 from replication.evidence.calibration import CALIBRATED, PAIR, grid
 from replication.evidence.claims import Claims, criteria_hash, load_claims, short_label
-from replication.evidence.experiments import EXPERIMENTS
 from replication.evidence.sensitivity import (
     HOLDS,
     NOISE,
@@ -38,6 +37,7 @@ from replication.evidence.verdicts import (
     by_claim,
     judged_trials,
     overall,
+    read_trials,
 )
 from replication.irl import METHODS, READINGS
 from replication.report.readable import F_LABELS, markdown, readable_verdicts
@@ -294,8 +294,7 @@ def findings_context(figures: Path) -> dict[str, Any]:
     read = partial(_read, figures)
     judged, effects = read("claims/verdicts"), read("sensitivity/effects")
     factorial = effects[effects["group"] == "factorial"]
-    trials = pd.concat(read(f"{task.replace('-', '_')}/trials") for task in EXPERIMENTS)
-    trials = judged_trials(trials, load_claims().judging)
+    trials = judged_trials(read_trials(figures), load_claims().judging)
     compared = judged[judged["direction"] != "inside"]
     holds = {id: holding(effects, id) for id in compared["id"].drop_duplicates()}
     table = readable_verdicts(compared).assign(**{"Holds with other choices": list(holds.values())})

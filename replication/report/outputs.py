@@ -12,9 +12,11 @@ from typing import Any
 
 import pandas as pd
 
-from replication.evidence.tables import markdown, read_table, write_csv
+from replication.evidence.tables import read_table, write_csv
 from replication.files import write_file
 from replication.report.picture import Picture
+from replication.report.players import Player
+from replication.report.readable import markdown
 from replication.report.style import save_figure
 
 
@@ -56,12 +58,12 @@ class Outputs:
         write_file(self.folder / f"{name}.md", text)
         return Shown({"text/markdown": text, "text/plain": text}, kind="table", name=name)
 
-    def player(self, player: str, name: str, *, numbers: pd.DataFrame, words: str) -> Shown:
+    def player(self, player: Player, name: str) -> Shown:
         """Write a moving figure as `name`.html, and its numbers as `name`.csv; show it."""
-        write_csv(numbers, self.folder / f"{name}.csv")
-        write_file(self.folder / f"{name}.html", player)
-        data = {"text/html": player, "text/plain": words}
-        return Shown(data, kind="player", name=name, alt=words)
+        write_csv(player.numbers, self.folder / f"{name}.csv")
+        write_file(self.folder / f"{name}.html", player.html)
+        data = {"text/html": player.html, "text/plain": player.words}
+        return Shown(data, kind="player", name=name, alt=player.words)
 
     def data(self, table: pd.DataFrame, name: str) -> None:
         """Write a table that is not shown as `name`.csv."""

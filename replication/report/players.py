@@ -33,10 +33,12 @@ from replication.demos.model import Demos
 from replication.envs.maze import as_maze
 from replication.envs.soccer import rules
 from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import F_LABELS, Key
+from replication.envs.soccer.replay import replay
+from replication.evidence.experiments import Key
 from replication.irl import Trial, get_method
-from replication.report.field_figures import _draw_field, trace
-from replication.report.figures import COLOURS, _draw_map, _places
+from replication.report.field import draw_pitch
+from replication.report.maze import draw_map, map_numbers, places
+from replication.report.readable import F_LABELS
 from replication.report.style import legend_below, style
 
 Floats = NDArray[np.float64]
@@ -48,13 +50,22 @@ REWARD_MAP = "PiYG"
 
 
 @dataclass(frozen=True)
+class Player:
+    """A moving figure as HTML, its numbers, and what it shows in words."""
+
+    html: str
+    numbers: pd.DataFrame
+    words: str
+
+
+@dataclass(frozen=True)
 class Course:
     """One trial, iteration by iteration: entry i is what there is after i weight updates.
 
     Attributes
     ----------
-    label, colour
-        How the method is named and drawn.
+    method, reading
+        What learned, and under which reading of Eq. 9.
     errors
         d (Eq. 6), [n + 1].
     ways
@@ -63,11 +74,17 @@ class Course:
         Reward weights of what is coloured, [n + 1, cell or pair].
     """
 
-    label: str
-    colour: str
+    method: str
+    reading: str
     errors: Floats
     ways: tuple[Floats, ...]
     weights: Floats
+
+    @property
+    def label(self) -> str:
+        """How it is called."""
+        label = get_method(self.method).label
+        return f"{label}, {F_LABELS[self.reading]}" if self.reading else label
 
     @property
     def iterations(self) -> int:
@@ -83,72 +100,72 @@ def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
     demos
         Where they learned: a maze or the soccer field.
     trials
-        By method and F index.
+        By method and reading of Eq. 9.
     """
-    found = []
-    for (method, f_index), trial in trials.items():
+    shown = []
+    for (method, reading), trial in trials.items():
         assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
-        label = get_method(method).label + (f", {F_LABELS[f_index]}" if f_index else "")
-        found.append(
-            Course(
-                label,
-                COLOURS[method],
-                trial.errors,
-                tuple(_way(demos, episode.states, episode.actions) for episode in trial.episodes),
-                _shown_weights(demos, trial.snapshots.weights),
-            )
-        )
-    return found
+        ways = tuple(_way(demos, episode.states, episode.actions) for episode in trial.episodes)
+        weights = _shown_weights(demos, trial.snapshots.weights)
+        shown.append(Course(method, reading, trial.errors, ways, weights))
+    return shown
 
 
-def course_numbers(shown: Sequence[Course]) -> pd.DataFrame:
-    """Return what the player shows in numbers: a row for each method and iteration."""
-    rows = [
-        {
-            "method": one.label,
-            "iteration": i,
-            "d": one.errors[i],
-            "moves": len(one.ways[i]) - 1,
-            "last x": one.ways[i][-1, 0],
-            "last y": one.ways[i][-1, 1],
-            "lowest weight": one.weights[i].min(),
-            "highest weight": one.weights[i].max(),
-        }
-        for one in shown
-        for i in range(one.iterations + 1)
-    ]
-    return pd.DataFrame(rows)
-
-
-def describe_courses(shown: Sequence[Course]) -> str:
-    """Return the player in words."""
-    ends = "; ".join(
-        f"{one.label}: "
-        + (f"d = 0 after {one.iterations}" if one.errors[-1] == 0 else f"d = {one.errors[-1]:.3g}")
-        for one in shown
-    )
-    return (
-        "The agent's way, its reward weights and its error, iteration by iteration, one trial of "
-        f"each method side by side. Iterations to the end: {ends}."
-    )
-
-
-def learning_player(demos: Demos, shown: Sequence[Course]) -> str:
+def learning_player(demos: Demos, shown: Sequence[Course]) -> Player:
     """Return a player with a frame for each iteration, the methods side by side.
 
     A method that has converged keeps its last frame until all have. Of very many iterations some
     are left out, evenly.
     """
+    words = _describe(shown)
+    html = player(_animation(demos, shown), words, frames_a_second=FRAMES_A_SECOND)
+    return Player(html, _numbers(shown), words)
+
+
+def _numbers(shown: Sequence[Course]) -> pd.DataFrame:
+    """Return a row for each method and iteration."""
+    rows = [
+        {
+            "method": course.method,
+            "reading": course.reading,
+            "iteration": i,
+            "error": course.errors[i],
+            "moves": len(course.ways[i]) - 1,
+            "last_x": course.ways[i][-1, 0],
+            "last_y": course.ways[i][-1, 1],
+            "lowest_weight": course.weights[i].min(),
+            "highest_weight": course.weights[i].max(),
+        }
+        for course in shown
+        for i in range(course.iterations + 1)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _describe(shown: Sequence[Course]) -> str:
+    ends = [
+        f"{course.label}: d = 0 after {course.iterations}"
+        if course.errors[-1] == 0
+        else f"{course.label}: d = {course.errors[-1]:.3g}"
+        for course in shown
+    ]
+    return (
+        "The agent's way, its reward weights and its error, iteration by iteration, one trial of "
+        f"each method side by side. Iterations to the end: {'; '.join(ends)}."
+    )
+
+
+def _animation(demos: Demos, shown: Sequence[Course]) -> FuncAnimation:
     with style():
         figure = Figure(figsize=(2.75 * len(shown) + 0.5, 4.35), dpi=DPI, layout="constrained")
         _Canvas(figure)
         grid = figure.subplots(2, len(shown), height_ratios=(3, 1), squeeze=False)
         # Colours show the root of a weight's size: one wrong loop outweighs all that is learned.
-        most = np.sqrt(max(np.abs(one.weights).max() for one in shown)) or 1.0
+        most = np.sqrt(max(np.abs(course.weights).max() for course in shown)) or 1.0
         norm = Normalize(-most, most)
-        panels = [_Panel(demos, one, norm, *grid[:, at]) for at, one in enumerate(shown)]
-        longest = max(one.iterations for one in shown)
-        highest = max(one.errors.max() for one in shown)
+        panels = [_Panel(demos, course, norm, *grid[:, at]) for at, course in enumerate(shown)]
+        longest = max(course.iterations for course in shown)
+        highest = max(course.errors.max() for course in shown)
         for curve in grid[1]:
             curve.set(xlim=(0, longest), ylim=(0, highest * 1.05), xlabel="iteration")
             curve.label_outer()
@@ -182,7 +199,7 @@ def learning_player(demos: Demos, shown: Sequence[Course]) -> str:
             frames=np.linspace(0, longest, min(longest + 1, MOST_FRAMES)).round().astype(int),
             cache_frame_data=False,
         )
-    return player(animation, describe_courses(shown), frames_a_second=FRAMES_A_SECOND)
+    return animation
 
 
 class _Canvas(FigureCanvasAgg):
@@ -210,40 +227,41 @@ class _Panel:
         above.plot(*expert.T, color="0.45", ls=":", lw=1.4, zorder=4)
         (self.way,) = above.plot([], [], color="0.1", lw=1.6, solid_capstyle="round", zorder=6)
         (self.end,) = above.plot([], [], "o", color="0.1", ms=4, zorder=6)
-        below.plot(course.errors, color=course.colour, lw=0.8, alpha=0.35)
-        (self.error,) = below.plot([], [], color=course.colour, lw=1.4)
-        (self.now,) = below.plot([], [], "o", color=course.colour, ms=4, clip_on=False)
+        colour = get_method(course.method).colour
+        below.plot(course.errors, color=colour, lw=0.8, alpha=0.35)
+        (self.error,) = below.plot([], [], color=colour, lw=1.4)
+        (self.now,) = below.plot([], [], "o", color=colour, ms=4, clip_on=False)
 
     def draw(self, frame: int) -> None:
         """Show the state after so many iterations, or the last one."""
-        one, i = self.course, min(frame, self.course.iterations)
-        weights = one.weights[i, self.coloured]
+        course, i = self.course, min(frame, self.course.iterations)
+        weights = course.weights[i, self.coloured]
         self.rewards.set_array(np.sign(weights) * np.sqrt(np.abs(weights)))
-        self.way.set_data(*one.ways[i].T)
-        self.end.set_data(*one.ways[i][-1:].T)
-        self.error.set_data(np.arange(i + 1), one.errors[: i + 1])
-        self.now.set_data([i], [one.errors[i]])
-        status = f"iteration {i}: {len(one.ways[i]) - 1} moves, d = {one.errors[i]:.2f}"
-        if i == one.iterations:
-            status = f"ends after {i} iterations, d = {one.errors[i]:.3g}"
-        self.above.set_title(f"{one.label}\n{status}", loc="left", fontsize=8)
+        self.way.set_data(*course.ways[i].T)
+        self.end.set_data(*course.ways[i][-1:].T)
+        self.error.set_data(np.arange(i + 1), course.errors[: i + 1])
+        self.now.set_data([i], [course.errors[i]])
+        status = f"iteration {i}: {len(course.ways[i]) - 1} moves, d = {course.errors[i]:.2f}"
+        if i == course.iterations:
+            status = f"ends after {i} iterations, d = {course.errors[i]:.3g}"
+        self.above.set_title(f"{course.label}\n{status}", loc="left", fontsize=8)
 
 
 def _backdrop(demos: Demos, panel: Axes) -> Floats:
     """Draw where the agent moves; return the corners of what rewards colour, [shape, corner, 2]."""
     if isinstance(demos.environment, SoccerField):
-        _draw_field(panel)
+        draw_pitch(panel)
         panel.set(xticks=[], yticks=[])
         x = np.linspace(0, rules.WIDTH, rules.COLUMNS + 1)
         y = np.linspace(0, rules.HEIGHT, rules.ROWS + 1)
-        left, low = (one.ravel() for one in np.meshgrid(x[:-1], y[:-1], indexing="ij"))
-        right, high = (one.ravel() for one in np.meshgrid(x[1:], y[1:], indexing="ij"))
+        left, low = (side.ravel() for side in np.meshgrid(x[:-1], y[:-1], indexing="ij"))
+        right, high = (side.ravel() for side in np.meshgrid(x[1:], y[1:], indexing="ij"))
         corners = [(left, low), (right, low), (right, high), (left, high)]
         return np.stack([np.stack(corner, axis=1) for corner in corners], axis=1)
     maze = as_maze(demos.environment)
-    _draw_map(panel, maze, grid=False)
+    draw_map(panel, map_numbers(maze), grid=False)
     panel.set(xticks=[], yticks=[], xlabel="", ylabel="", anchor="N")
-    centre = np.stack(_places(maze, np.arange(maze.n_states)), axis=1)
+    centre = np.stack(places(maze, np.arange(maze.n_states)), axis=1)
     # A cell's four triangles are its actions: up, down, right, left.
     sides = 0.5 * np.array(
         [((-1, 1), (1, 1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1)), ((-1, -1), (-1, 1))]
@@ -256,8 +274,8 @@ def _backdrop(demos: Demos, panel: Axes) -> Floats:
 def _way(demos: Demos, states: NDArray[np.int64], actions: NDArray[np.int64]) -> Floats:
     """Return where an episode leads, x and y [T + 1, 2]."""
     if isinstance(demos.environment, SoccerField):
-        return trace(demos.environment, actions).poses[:, :2]
-    return np.stack(_places(as_maze(demos.environment), states), axis=1).astype(float)
+        return replay(demos.environment, actions).poses[:, :2]
+    return np.stack(places(as_maze(demos.environment), states), axis=1).astype(float)
 
 
 def _shown_weights(demos: Demos, weights: Floats) -> Floats:

@@ -23,7 +23,6 @@ from replication.files import write_file
 
 P = ParamSpec("P")
 
-
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -42,25 +41,15 @@ STYLE: dict[Any, Any] = {
     "savefig.dpi": 200,
 }
 
-
 CORRECT_COLOUR = "#D0021B"
-
-
 KIND_COLOURS = {"hit": "#0B3C8C", "detour": "#56A3E8"}
-
-
 OTHER_KIND_COLOUR = "#009E73"
-
-
+LEARNED_COLOUR = "#0072B2"
 OBSTACLE_COLOUR = "#8C8C8C"
-
-
 START_COLOUR, GOAL_COLOUR = "#E24A33", "#2CA02C"
-
 
 WIDTH = 7.0
 """Inches: both columns of a page."""
-
 
 ROW = 115
 """Characters that a row of a legend has room for, 8 of them for each handle."""
@@ -98,6 +87,7 @@ def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "sv
 
 
 def canvas(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tuple[Figure, Any]:
+    """Return a figure as wide as a page, and its axes as an array."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(n_rows, n_columns, **layout)
@@ -105,6 +95,7 @@ def canvas(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tupl
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """Put a legend below all axes, in two rows where one row has no room for it."""
     wide = sum(len(str(handle.get_label())) + 8 for handle in handles) > ROW
     ncols = -(-len(handles) // 2) if wide else len(handles)
     figure.legend(handles=handles, loc="outside lower center", ncols=ncols)

@@ -1,0 +1,309 @@
+"""Pictures of many trials: errors (Figs. 5, 9, 12), iterations (Figs. 6, 9), what sets save.
+
+Each has a panel for each reading of Eq. 9; a method without a trace is shown in every panel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from replication.evidence.experiments import Key, under
+from replication.irl import METHODS, READINGS, get_method
+from replication.irl.methods import Method
+from replication.paper.published import Published
+from replication.report.picture import Picture
+from replication.report.readable import F_LABELS
+from replication.report.style import canvas, legend_below, settled
+from replication.trials.compute import TRACED_TRIAL
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+
+Panels = dict[str, list[tuple[Method, pd.DataFrame]]]
+
+
+def _panels(numbers: pd.DataFrame) -> Panels:
+    """Return each panel's title, and in it the rows of each method."""
+    readings = [name for name in READINGS if name in set(numbers["reading"])] or [""]
+    return {
+        F_LABELS[reading]: [
+            (method, rows)
+            for method in METHODS.values()
+            if len(rows := under(numbers[numbers["method"] == method.name], reading))
+        ]
+        for reading in readings
+    }
+
+
+def _name(method: str, reading: str) -> str:
+    label = get_method(method).label
+    return f"{label}, {F_LABELS[reading]}" if reading else label
+
+
+# --- errors ----------------------------------------------------------------------------------
+
+
+def errors(
+    results: Results,
+    conditions: Mapping[Key, Condition],
+    published: Mapping[str, int],
+    *,
+    median: bool = False,
+) -> Picture:
+    """Show the error d against the iteration.
+
+    Parameters
+    ----------
+    results, conditions
+        What to show.
+    published
+        The iteration at which the paper's own curve is zero, by method.
+    median
+        Whether the trial that is drawn is the median one (FIG12-TRIAL), or trial 0 (FIG5-TRIAL).
+    """
+    parts = []
+    for (method, reading), condition in conditions.items():
+        every = results.errors(condition)
+        trial = median_trial(results.iterations(condition)) if median else TRACED_TRIAL
+        low, middle, high = np.quantile(every, [0.25, 0.5, 0.75], axis=0)
+        columns = {
+            "reading": reading,
+            "method": method,
+            "iteration": np.arange(len(low)),
+            "trial": trial,
+            "error": every[trial],
+            "quartile_1": low,
+            "median": middle,
+            "quartile_3": high,
+            "paper": published.get(method, np.nan),
+        }
+        parts.append(pd.DataFrame(columns))
+    numbers = pd.concat(parts, ignore_index=True)
+    return Picture(numbers, draw_errors, _describe_errors(numbers))
+
+
+def median_trial(iterations: NDArray[np.int64]) -> int:
+    """Return the first trial with the (lower) median number of iterations.
+
+    Examples
+    --------
+    >>> median_trial(np.array([9, 3, 5, 5]))
+    2
+    """
+    middle = np.sort(iterations)[(len(iterations) - 1) // 2]
+    return int(np.flatnonzero(iterations == middle)[0])
+
+
+def _describe_errors(numbers: pd.DataFrame) -> str:
+    parts = [
+        f"{_name(method, reading)}: half of the trials are at zero after "
+        f"{(rows['median'] > 0).sum()} iterations"
+        for (reading, method), rows in numbers.groupby(["reading", "method"], sort=False)
+    ]
+    return f"Error d against iteration. {'; '.join(parts)}."
+
+
+@settled
+def draw_errors(numbers: pd.DataFrame) -> Figure:
+    """Draw one trial, declared before the run, as a line, and the middle half of all as a band.
+
+    Triangles on the axis mark where the paper's own curves reach zero.
+    """
+    panels = _panels(numbers)
+    figure, axes = canvas(1, len(panels), height=3.2, sharex=True, sharey=True)
+    for panel, (title, shown) in zip(axes, panels.items(), strict=True):
+        for method, rows in shown:
+            _draw_curve(panel, method, rows)
+        panel.set(title=title, xlabel="iteration")
+    axes[0].set(ylabel="error d", xlim=(0, None), ylim=(0, None))
+    handles: list[Artist] = [
+        *_handles(panels),
+        Patch(color="0.4", alpha=0.25, lw=0, label="middle half of all trials"),
+        Line2D([], [], color="0.4", marker="o", ms=4, lw=0, label="the drawn trial is at zero"),
+    ]
+    if numbers["paper"].notna().any():
+        handles.append(Line2D([], [], mec="0.4", lw=0, label="the paper's curve", **PAPER))
+    legend_below(figure, handles)
+    return figure
+
+
+PAPER: dict[str, Any] = {"marker": "v", "ms": 6, "mfc": "white"}
+
+
+def _draw_curve(panel: Axes, method: Method, rows: pd.DataFrame) -> None:
+    colour, iterations = method.colour, rows["iteration"].to_numpy()
+    low, high = rows["quartile_1"].to_numpy(), rows["quartile_3"].to_numpy()
+    panel.fill_between(iterations, low, high, color=colour, alpha=0.18, lw=0)
+    for edge in (low, high):
+        panel.plot(iterations, edge, color=colour, alpha=0.5, lw=0.5)
+    drawn = rows["error"].to_numpy()
+    end = int(np.argmax(drawn <= 0)) if (drawn <= 0).any() else len(drawn) - 1
+    panel.plot(iterations[: end + 1], drawn[: end + 1], **_line(method))
+    panel.plot(end, drawn[end], "o", color=colour, ms=4, clip_on=False, zorder=4)
+    paper = rows["paper"].iloc[0]
+    if not np.isnan(paper):
+        panel.plot(paper, 0, ls="none", mec=colour, clip_on=False, zorder=5, **PAPER)
+
+
+def _line(method: Method) -> dict[str, Any]:
+    # Dashes let the curve below be seen where two are the same.
+    dashes = (0, (4, 1.5)) if method.uses_incorrect else "-"
+    return {"color": method.colour, "lw": 1.1, "ls": dashes}
+
+
+def _handles(panels: Panels) -> list[Line2D]:
+    first = next(iter(panels.values()))
+    return [Line2D([], [], label=method.label, **_line(method)) for method, _ in first]
+
+
+# --- iterations ------------------------------------------------------------------------------
+
+
+def iterations(
+    results: Results, conditions: Mapping[Key, Condition], published: Mapping[str, Published]
+) -> Picture:
+    """Show the iterations of every trial, with their distribution.
+
+    That Fig. 9 shows this, and not errors, is the choice FIG9-AXES.
+
+    Parameters
+    ----------
+    results, conditions
+        What to show.
+    published
+        The paper's numbers, by method.
+    """
+    parts = []
+    for (method, reading), condition in conditions.items():
+        counts = pd.Series(results.iterations(condition))
+        columns = {
+            "reading": reading,
+            "method": method,
+            "trial": np.arange(len(counts)),
+            "iterations": counts,
+            "trials_alike": counts.groupby(counts).transform("size"),
+            "mean": counts.mean(),
+            "paper": published[method].mean if method in published else np.nan,
+        }
+        parts.append(pd.DataFrame(columns))
+    numbers = pd.concat(parts, ignore_index=True)
+    return Picture(numbers, draw_iterations, _describe_iterations(numbers))
+
+
+def _describe_iterations(numbers: pd.DataFrame) -> str:
+    parts = [
+        f"{_name(method, reading)}: {rows['mean'].iloc[0]:.1f} on average"
+        for (reading, method), rows in numbers.groupby(["reading", "method"], sort=False)
+    ]
+    return f"Iterations of each trial. {'; '.join(parts)}."
+
+
+@settled
+def draw_iterations(numbers: pd.DataFrame) -> Figure:
+    """Draw a row for each reading: all trials, and beside them their distributions.
+
+    A dot marks our mean, an open triangle the paper's.
+    """
+    panels = _panels(numbers)
+    figure, grid = canvas(
+        len(panels), 2, height=0.7 + 2.0 * len(panels), width_ratios=(4, 1), sharey=True
+    )
+    grid = np.atleast_2d(grid)
+    for (left, right), (title, shown) in zip(grid, panels.items(), strict=True):
+        for position, (method, rows) in enumerate(shown):
+            left.plot(rows["trial"].to_numpy(), rows["iterations"].to_numpy(), **_line(method))
+            _draw_distribution(right, position, method.colour, rows)
+        left.set_title(title, loc="left")
+        left.set(ylabel="iterations", xlim=(-1, len(shown[0][1])))
+        right.set(xticks=[], xlim=(-0.7, len(shown) - 0.3))
+        right.spines["bottom"].set_visible(False)
+        right.tick_params(labelleft=False)
+    grid[-1, 0].set(xlabel="trial", ylim=(0, None))
+    handles = _handles(panels)
+    handles.append(Line2D([], [], color="0.3", marker="o", ms=5, lw=0, label="our mean"))
+    if numbers["paper"].notna().any():
+        handles.append(Line2D([], [], mec="0.3", lw=0, label="the paper's mean", **PAPER))
+    legend_below(figure, handles)
+    return figure
+
+
+def _draw_distribution(panel: Axes, position: int, colour: str, rows: pd.DataFrame) -> None:
+    bars = rows.drop_duplicates("iterations").sort_values("iterations")
+    half = 0.42 * bars["trials_alike"].to_numpy() / bars["trials_alike"].max()
+    panel.barh(
+        bars["iterations"].to_numpy(),
+        2 * half,
+        left=position - half,
+        height=0.9,
+        color=colour,
+        alpha=0.35,
+    )
+    panel.plot(position, rows["mean"].iloc[0], "o", color=colour, ms=5, zorder=4)
+    paper = rows["paper"].iloc[0]
+    if not np.isnan(paper):
+        panel.plot(position + 0.3, paper, ls="none", mec=colour, zorder=5, **PAPER)
+
+
+# --- sets of incorrect demonstrations --------------------------------------------------------
+
+
+def sets(table: pd.DataFrame) -> Picture:
+    """Show what each set of incorrect demonstrations saves, a panel for each reading of Eq. 9.
+
+    `table` is that of :func:`replication.evidence.tables.sets_table`, whose differences are
+    negative where iterations are saved.
+    """
+    return Picture(table, draw_sets, _describe_sets(table))
+
+
+def _saved(table: pd.DataFrame) -> Panels:
+    return _panels(
+        table[table["set"] != "none"].assign(
+            saved=lambda rows: 0 - rows["difference"],
+            least=lambda rows: 0 - rows["high"],
+            most=lambda rows: 0 - rows["low"],
+        )
+    )
+
+
+def _describe_sets(table: pd.DataFrame) -> str:
+    parts = [
+        f"{row.set}, {title}: {row.saved:.1f} ({row.least:.1f} to {row.most:.1f})"
+        for title, shown in _saved(table).items()
+        for _, rows in shown
+        for row in rows.itertuples()
+    ]
+    return f"Iterations saved by incorrect demonstrations, with 95 % intervals. {'; '.join(parts)}."
+
+
+@settled
+def draw_sets(numbers: pd.DataFrame) -> Figure:
+    """Draw what each set saves with its interval; beside its name stand the pairs that leave."""
+    panels = {title: shown[0] for title, shown in _saved(numbers).items() if shown}
+    n_sets = max((len(rows) for _, rows in panels.values()), default=0)
+    figure, axes = canvas(
+        1, max(len(panels), 1), height=1.1 + 0.26 * n_sets, sharex=True, sharey=True
+    )
+    for panel, (title, (method, rows)) in zip(axes, panels.items(), strict=bool(panels)):
+        y = np.arange(len(rows))
+        panel.axvline(0, color="0.5", lw=0.8)
+        panel.hlines(y, rows["least"], rows["most"], color=method.colour, lw=1.4)
+        panel.plot(rows["saved"], y, "o", ms=4.5, color=method.colour)
+        panel.set(title=title, yticks=y)
+        panel.set_yticklabels(f"{row.set}  ({row.leaving})" for row in rows.itertuples())
+    if not panels:
+        axes[0].set(title="no incorrect demonstrations", yticks=[])
+    for panel in axes:
+        panel.set_xlabel("iterations saved")
+    axes[0].invert_yaxis()
+    axes[0].set_ylabel("set (leaving pairs)")
+    return figure
