@@ -93,7 +93,7 @@ def effects(
 
 
 @pytest.mark.parametrize(
-    ("id", "effect", "low", "high", "due"),
+    ("id", "effect", "low", "high", "expected"),
     [
         ("FASTER", -2.0, -3.0, -1.0, HOLDS),
         ("FASTER", -2.0, -4.0, 0.0, OPEN),
@@ -109,9 +109,9 @@ def effects(
         ("ZERO-OPEN", 0.5, 0.3, 0.7, REVERSED),
     ],
 )
-def test_outcome_by_hand(id: str, effect: float, low: float, high: float, due: str) -> None:
+def test_outcome_by_hand(id: str, effect: float, low: float, high: float, expected: str) -> None:
     """The whole interval lies beyond the margin; a share holds where it is itself above it."""
-    assert _outcome(load_claims().by_id(id), effect, low, high) == due
+    assert _outcome(load_claims().by_id(id), effect, low, high) == expected
 
 
 def test_effects_of_many_rows_are_those_of_each() -> None:
@@ -251,9 +251,9 @@ def test_ratio_interval_that_reaches_zero_gives_no_infinite_noise() -> None:
     logs = np.random.default_rng(6).normal(0, 0.5, len(specifications))
     ratios = effects(specifications, np.exp(logs), statistic="sd-ratio")
     ratios["low"], ratios["high"] = np.exp(logs - 0.2), np.exp(logs + 0.2)
-    due = shares_of(ratios, specifications)
+    expected = shares_of(ratios, specifications)
     ratios.loc[3, "low"] = 0.0
-    assert shares_of(ratios, specifications) == pytest.approx(due)
+    assert shares_of(ratios, specifications) == pytest.approx(expected)
 
 
 def test_missing_effects_are_left_out() -> None:
@@ -262,9 +262,9 @@ def test_missing_effects_are_left_out() -> None:
     made = np.random.default_rng(7).normal(size=len(specifications))
     table = effects(specifications, made, half=0.5)
     more = table.head(5).assign(specification=[f"single {n}" for n in range(5)], effect=100.0)
-    due = shares_of(table.iloc[30:], specifications)
+    expected = shares_of(table.iloc[30:], specifications)
     table.loc[:29, ["effect", "low", "high"]] = np.nan
-    assert shares_of(pd.concat([table, more]), specifications) == pytest.approx(due)
+    assert shares_of(pd.concat([table, more]), specifications) == pytest.approx(expected)
 
 
 def test_too_few_specifications_give_no_shares() -> None:
@@ -296,12 +296,12 @@ def test_levels_add_up() -> None:
         assert part["specifications"].sum() == len(specifications)
         assert part["value"].tolist() == sorted(CHOICES[str(id)])
         assert part["default"].sum() == 1
-        for name, due in (
+        for name, expected in (
             ("mean_effect", made.mean()),
             ("holds", (table["outcome"] == HOLDS).mean()),
             ("reversed", (table["outcome"] == REVERSED).mean()),
         ):
-            assert np.average(part[name], weights=part["specifications"]) == pytest.approx(due)
+            assert np.average(part[name], weights=part["specifications"]) == pytest.approx(expected)
     row = levels[(levels["choice"] == "TIES") & (levels["value"] == "first")].iloc[0]
     own = [dict(one.choices)["TIES"] == "first" for one in specifications]
     assert row["mean_effect"] == pytest.approx(made[own].mean())
@@ -429,12 +429,12 @@ def test_published_tables_follow_from_the_published_effects() -> None:
         on=["claim", "choice"],
         suffixes=("", "_uncapped"),
     )
-    due = {
+    expected = {
         "outcomes": outcome_shares(pd.concat([single, together, soccer])),
         "shares": shares,
         "levels": level_table(together, made),
     }
-    for name, table in due.items():
+    for name, table in expected.items():
         stored = read_table(FIGURES / f"sensitivity_{name}.csv")
         assert stored.columns.tolist() == table.columns.tolist()
         for column in table:
