@@ -152,6 +152,19 @@ def main_trials(trials: pd.DataFrame) -> pd.DataFrame:
     return trials[(trials["set"] == "none") | (trials["set"] == default)]
 
 
+def applies(own: str, reading: str) -> bool:
+    """Return whether what has one reading of Eq. 9, or none, counts under another one.
+
+    A method without a trace counts under both.
+
+    Examples
+    --------
+    >>> [applies(own, "printed") for own in ("", "printed", "updated")]
+    [True, True, False]
+    """
+    return own in ("", reading)
+
+
 def under(rows: pd.DataFrame, reading: str) -> pd.DataFrame:
-    """Return the rows under a reading of Eq. 9; a method without a trace counts under both."""
-    return rows[rows["reading"].isin(("", reading))]
+    """Return the rows that count under a reading of Eq. 9."""
+    return rows[[applies(own, reading) for own in rows["reading"]]]

@@ -290,9 +290,8 @@ def draw_sets(numbers: pd.DataFrame) -> Figure:
     """Draw what each set saves with its interval; beside its name stand the pairs that leave."""
     panels = {title: shown[0] for title, shown in _saved(numbers).items() if shown}
     n_sets = max((len(rows) for _, rows in panels.values()), default=0)
-    figure, axes = canvas(
-        1, max(len(panels), 1), height=1.1 + 0.26 * n_sets, sharex=True, sharey=True
-    )
+    height = max(1.1 + 0.26 * n_sets, 2.0)
+    figure, axes = canvas(1, max(len(panels), 1), height=height, sharex=True, sharey=True)
     for panel, (title, (method, rows)) in zip(axes, panels.items(), strict=bool(panels)):
         y = np.arange(len(rows))
         panel.axvline(0, color="0.5", lw=0.8)

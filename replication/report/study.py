@@ -10,7 +10,13 @@ import pandas as pd
 from IPython.display import Markdown
 
 from replication.demos.files import load_demos
-from replication.evidence.experiments import EXPERIMENTS, Key, method_conditions, set_conditions
+from replication.evidence.experiments import (
+    EXPERIMENTS,
+    Key,
+    applies,
+    method_conditions,
+    set_conditions,
+)
 from replication.files import resolve
 from replication.irl import Trial
 from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
@@ -99,7 +105,7 @@ class Study(Outputs):
         return {
             key: self.results.trial(condition, TRACED_TRIAL, snapshots=True)
             for key, condition in self.conditions.items()
-            if key[1] in ("", reading)
+            if applies(key[1], reading)
         }
 
     def show(self, table: pd.DataFrame) -> Markdown:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,13 +19,12 @@ from replication.evidence.experiments import Key
 from replication.irl import Trial
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
-from replication.report.field_figures import animate
+from replication.report.film import film
 from replication.report.players import (
     MOST_FRAMES,
     Course,
-    course_numbers,
+    Player,
     courses,
-    describe_courses,
     learning_player,
     player,
 )
@@ -61,7 +61,7 @@ def shown(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> list[
 
 
 @pytest.fixture(scope="module")
-def page(small_demos: Demos, shown: list[Course]) -> str:
+def made(small_demos: Demos, shown: list[Course]) -> Player:
     """Make a player of it."""
     return learning_player(small_demos, shown)
 
@@ -97,27 +97,31 @@ def test_the_last_way_is_the_experts(small_demos: Demos, shown: list[Course]) ->
         assert len(one.ways[-1]) == len(small_demos.correct[0].states)
 
 
-def test_numbers_have_a_row_for_each_iteration(shown: list[Course]) -> None:
+def test_numbers_have_a_row_for_each_iteration(made: Player, shown: list[Course]) -> None:
     """The file beside a player has what moves, method by method."""
-    table = course_numbers(shown)
+    table = made.numbers
     assert len(table) == sum(one.iterations + 1 for one in shown)
     last = table.groupby("method", sort=False).tail(1)
-    assert last["d"].tolist() == [0, 0]
+    assert last["error"].tolist() == [0, 0]
     assert last["iteration"].tolist() == [one.iterations for one in shown]
 
 
-def test_words_say_how_each_method_ends(shown: list[Course]) -> None:
+def test_words_say_how_each_method_ends(
+    small_demos: Demos, made: Player, shown: list[Course]
+) -> None:
     """Who cannot see the player reads how many iterations each method takes."""
-    text = describe_courses(shown)
     for one in shown:
-        assert f"{one.label}: d = 0 after {one.iterations}" in text
-    unfinished = Course("slow", "k", np.array([2.0, 1.5]), (), np.zeros((2, 1)))
-    assert "slow: d = 1.5" in describe_courses([unfinished])
+        assert f"{one.label}: d = 0 after {one.iterations}" in made.words
+    first = shown[0]
+    unfinished = replace(
+        first, errors=np.array([2.0, 1.5]), ways=first.ways[:2], weights=first.weights[:2]
+    )
+    assert f"{first.label}: d = 1.5" in learning_player(small_demos, [unfinished]).words
 
 
-def test_there_is_a_frame_for_each_iteration(page: str, shown: list[Course]) -> None:
+def test_there_is_a_frame_for_each_iteration(made: Player, shown: list[Course]) -> None:
     """The slower method gives the number of frames, and each frame differs from the one before."""
-    drawn = frames(page)
+    drawn = frames(made.html)
     assert len(drawn) == max(one.iterations for one in shown) + 1
     assert all(one != other for one, other in pairwise(drawn))
 
@@ -126,14 +130,13 @@ def test_many_iterations_are_thinned(small_demos: Demos, shown: list[Course]) ->
     """A trial of very many iterations keeps its first and last ones, and the player stays small."""
     one = shown[1]
     many = 3 * MOST_FRAMES
-    long = Course(
-        one.label,
-        one.colour,
-        np.linspace(2, 0, many + 1),
-        tuple(one.ways[-1] for _ in range(many + 1)),
-        np.linspace(0, 1, many + 1)[:, None] * one.weights[-1],
+    long = replace(
+        one,
+        errors=np.linspace(2, 0, many + 1),
+        ways=tuple(one.ways[-1] for _ in range(many + 1)),
+        weights=np.linspace(0, 1, many + 1)[:, None] * one.weights[-1],
     )
-    assert len(frames(learning_player(small_demos, [long]))) == MOST_FRAMES
+    assert len(frames(learning_player(small_demos, [long]).html)) == MOST_FRAMES
 
 
 def test_soccer_is_shown_on_the_field(soccer_demos: Demos, tmp_path: Path) -> None:
@@ -144,7 +147,7 @@ def test_soccer_is_shown_on_the_field(soccer_demos: Demos, tmp_path: Path) -> No
     cells = trials["adaboost", ""].weights.reshape(192, -1)
     np.testing.assert_array_equal(np.abs(found[0].weights[-1]), np.abs(cells).max(axis=1))
     assert found[0].ways[0].max() < 1.4
-    assert len(frames(learning_player(soccer_demos, found))) == 4
+    assert len(frames(learning_player(soccer_demos, found).html)) == 4
 
 
 @pytest.fixture(params=["maze", "field"])
@@ -153,10 +156,11 @@ def make(
 ) -> Callable[[], str]:
     """Return what makes a player."""
 
-    def film() -> str:
-        return player(animate(SoccerField(), {"a & <b>": [0, 0]}), "<one> & two", frames_a_second=5)
+    def moving() -> str:
+        shown = film(SoccerField(), {"a & <b>": [0, 0]})
+        return player(shown.animation, "<one> & two", frames_a_second=5)
 
-    return film if request.param == "field" else lambda: learning_player(small_demos, shown)
+    return moving if request.param == "field" else lambda: learning_player(small_demos, shown).html
 
 
 def test_player_needs_nothing_from_elsewhere(make: Callable[[], str]) -> None:

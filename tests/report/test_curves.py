@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from replication import Demos
+from replication.evidence.experiments import method_conditions
+from replication.irl import METHODS
+from replication.paper.published import TABLE_1
+from replication.report.curves import (
+    draw_errors,
+    draw_iterations,
+    draw_sets,
+    errors,
+    iterations,
+    median_trial,
+    sets,
+)
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
+
+FEW = {"episodes": 100, "horizon": 40}
+
+ERRORS = pd.DataFrame(
+    {
+        "reading": "printed",
+        "method": "unified",
+        "iteration": [0, 1, 2, 3],
+        "trial": 0,
+        "error": [3.0, 1.0, 0.0, 0.0],
+        "quartile_1": [2.0, 1.0, 0.0, 0.0],
+        "median": [2.5, 1.5, 0.5, 0.0],
+        "quartile_3": [3.0, 2.0, 1.0, 0.0],
+        "paper": 9,
+    }
+)
+SAVED = pd.DataFrame(
+    {
+        "set": ["none", "hit", "none", "hit"],
+        "reading": ["printed", "printed", "updated", "updated"],
+        "method": ["unified", "unified-incorrect"] * 2,
+        "leaving": [0, 7, 0, 7],
+        "difference": [0.0, -2.0, 0.0, 1.0],
+        "low": [0.0, -3.0, 0.0, -0.5],
+        "high": [0.0, 0.5, 0.0, 2.0],
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """Run a few trials of every method."""
+    store = Store(tmp_path_factory.mktemp("curves") / "trials.sqlite")
+    conditions = list(method_conditions(small_demos, FEW).values())
+    return run_trials(conditions, trials=4, store=store, seed=2)
+
+
+def test_errors_are_those_of_the_trials(small_demos: Demos, results: Results) -> None:
+    """Each condition has the drawn trial and the quartiles of all at each iteration."""
+    conditions = method_conditions(small_demos, FEW)
+    for median in (False, True):
+        numbers = errors(results, conditions, {"unified": 47}, median=median).numbers
+        assert len(numbers) == sum(results.errors(one).shape[1] for one in conditions.values())
+        for (method, reading), condition in conditions.items():
+            rows = numbers[(numbers["method"] == method) & (numbers["reading"] == reading)]
+            every = results.errors(condition)
+            trial = median_trial(results.iterations(condition)) if median else 0
+            assert set(rows["trial"]) == {trial}
+            assert rows["error"].tolist() == every[trial].tolist()
+            columns = rows[["quartile_1", "median", "quartile_3"]].to_numpy().T
+            np.testing.assert_array_equal(columns, np.quantile(every, [0.25, 0.5, 0.75], axis=0))
+            assert (rows["paper"] == 47).all() == (method == "unified")
+
+
+def test_iterations_are_those_of_the_trials(small_demos: Demos, results: Results) -> None:
+    """Every trial has a row with its count, how many are like it, our mean and the paper's."""
+    conditions = method_conditions(small_demos, FEW)
+    numbers = iterations(results, conditions, {"unified": TABLE_1["unified"]}).numbers
+    for (method, reading), condition in conditions.items():
+        rows = numbers[(numbers["method"] == method) & (numbers["reading"] == reading)]
+        counts = results.iterations(condition).tolist()
+        assert rows["iterations"].tolist() == counts
+        assert rows["trials_alike"].tolist() == [counts.count(n) for n in counts]
+        assert set(rows["mean"]) == {np.mean(counts)}
+        assert (rows["paper"] == 40.1).all() == (method == "unified")
+
+
+def test_a_method_without_a_trace_is_in_every_panel(small_demos: Demos, results: Results) -> None:
+    """AdaBoost-IRL's line is drawn under both readings of Eq. 9, from the same rows."""
+    conditions = method_conditions(small_demos, FEW, ["adaboost", "unified"])
+    numbers = iterations(results, conditions, {}).numbers
+    panels = draw_iterations(numbers).axes[::2]
+    assert [panel.get_title(loc="left") for panel in panels] == ["Fᵢ (printed)", "Fᵢ₊₁ (updated)"]
+    for panel in panels:
+        first, second = panel.lines
+        colours = [first.get_color(), second.get_color()]
+        assert colours == [METHODS[name].colour for name in ("adaboost", "unified")]
+    drawn = [np.asarray(panel.lines[0].get_ydata()).tolist() for panel in panels]
+    assert drawn[0] == drawn[1] == results.iterations(conditions["adaboost", ""]).tolist()
+
+
+def test_traced_trial_ends_where_it_reaches_zero() -> None:
+    """The line of Fig. 5 stops at the first zero, and the paper's mark stands at its iteration."""
+    (panel,) = draw_errors(ERRORS).axes
+    lines = [np.asarray(line.get_xydata()) for line in panel.lines]
+    assert any(np.array_equal(line, [[0, 3], [1, 1], [2, 0]]) for line in lines)
+    assert any((line == [[9, 0]]).all() for line in lines if line.shape == (1, 2))
+
+
+def test_the_papers_mark_is_explained_only_where_it_is() -> None:
+    """Without a published number there is no triangle, neither in the panel nor in the legend."""
+    for numbers, marks in ((ERRORS, 1), (ERRORS.assign(paper=np.nan), 0)):
+        figure = draw_errors(numbers)
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert texts.count("the paper's curve") == marks
+        assert sum(line.get_marker() == "v" for line in figure.axes[0].lines) == marks
+
+
+def test_iterations_are_drawn_as_given() -> None:
+    """Fig. 6 shows every trial's count, unsmoothed, and the mean beside it."""
+    numbers = pd.DataFrame(
+        {
+            "reading": "printed",
+            "method": "unified",
+            "trial": [0, 1, 2],
+            "iterations": [44, 40, 44],
+            "trials_alike": [2, 1, 2],
+            "mean": 128 / 3,
+            "paper": 42.0,
+        }
+    )
+    left, right = draw_iterations(numbers).axes
+    np.testing.assert_array_equal(left.lines[0].get_ydata(), [44, 40, 44])
+    assert [line.get_ydata()[0] for line in right.lines] == [128 / 3, 42.0]  # type: ignore[index]
+    bars = {bar.get_y() + bar.get_height() / 2: bar.get_width() for bar in right.patches}  # type: ignore[attr-defined]
+    assert bars == pytest.approx({40: 0.42, 44: 0.84})
+
+
+def test_saved_is_the_negative_difference() -> None:
+    """What a set saves is positive where its difference is negative, with the interval turned."""
+    left, right = draw_sets(SAVED).axes
+    for panel, saved, ends in ((left, 2.0, (-0.5, 3.0)), (right, -1.0, (-2.0, 0.5))):
+        assert panel.lines[-1].get_xdata().tolist() == [saved]  # type: ignore[union-attr]
+        (segment,) = panel.collections[0].get_segments()  # type: ignore[attr-defined]
+        assert segment[:, 0].tolist() == list(ends)
+    assert [label.get_text() for label in left.get_yticklabels()] == ["hit  (7)"]
+    assert "hit, Fᵢ (printed): 2.0 (-0.5 to 3.0)" in sets(SAVED).words
+
+
+def test_no_sets_are_a_figure_too() -> None:
+    """A file without incorrect demonstrations gives an empty panel that says so, not a crash."""
+    (panel,) = draw_sets(SAVED[SAVED["set"] == "none"]).axes
+    assert panel.get_title() == "no incorrect demonstrations"
+
+
+def test_words_hold_the_numbers(small_demos: Demos, results: Results) -> None:
+    """The alternative texts give when half of the trials are at zero, and the means."""
+    condition = method_conditions(small_demos, FEW)["unified", "printed"]
+    one = {("unified", "printed"): condition}
+    counts = results.iterations(condition)
+    name = "Unified, without incorrect, Fᵢ (printed)"
+    below = (np.median(results.errors(condition), axis=0) > 0).sum()
+    words = errors(results, one, {}).words
+    assert f"{name}: half of the trials are at zero after {below} iterations" in words
+    assert f"{name}: {counts.mean():.1f} on average" in iterations(results, one, {}).words

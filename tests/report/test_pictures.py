@@ -1,0 +1,148 @@
+"""What holds for every picture, whatever it shows."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from replication import Demos, Params, fit
+from replication.demos.soccer_expert import demonstrate_soccer
+from replication.envs.soccer.field import SoccerField
+from replication.evidence.experiments import method_conditions, set_conditions
+from replication.evidence.tables import read_table, sets_table, write_csv
+from replication.paper.published import FIGURE_5, TABLE_1
+from replication.report import curves, field, maze
+from replication.report.picture import Picture
+from replication.report.style import save_figure
+from replication.trials.compute import TRACED_TRIAL
+from replication.trials.measures import Report, measure_trials
+from replication.trials.run import run_trials
+from replication.trials.store import Store
+
+FEW = {"episodes": 100, "horizon": 40}
+KINDS = [
+    *("map", "map without incorrect", "surfaces", "errors", "errors of one", "iterations"),
+    *("sets", "no sets", "field", "soccer", "soccer without incorrect"),
+]
+
+
+@pytest.fixture(scope="module")
+def pictures(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Picture]:
+    """Make each kind of picture once, of a few trials in a small maze and of the soccer field."""
+    conditions = method_conditions(small_demos, FEW)
+    sets = set_conditions(small_demos, FEW)
+    every = [*conditions.values(), *sets.values()]
+    store = Store(tmp_path_factory.mktemp("pictures") / "trials.sqlite")
+    results = run_trials(every, trials=3, store=store, seed=2)
+    saved = sets_table(measure_trials(results, every), sets)
+    traced = results.trial(conditions["unified", "printed"], TRACED_TRIAL, snapshots=True)
+    one = {("adaboost", ""): conditions["adaboost", ""]}
+    soccer = demonstrate_soccer("soccer", SoccerField())
+    return {
+        "map": maze.demonstrations(small_demos),
+        "map without incorrect": maze.demonstrations(small_demos.select("none")),
+        "surfaces": maze.surfaces(traced, small_demos.environment, Report()),
+        "errors": curves.errors(results, conditions, FIGURE_5),
+        "errors of one": curves.errors(results, one, {}, median=True),
+        "iterations": curves.iterations(results, conditions, TABLE_1),
+        "sets": curves.sets(saved),
+        "no sets": curves.sets(saved[saved["set"] == "none"]),
+        "field": field.start(soccer.environment),
+        "soccer": field.demonstrations(soccer),
+        "soccer without incorrect": field.demonstrations(soccer.select("none")),
+    }
+
+
+@pytest.fixture(scope="module")
+def tables(
+    pictures: dict[str, Picture], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, pd.DataFrame]:
+    """Read the numbers of each picture back from its file."""
+    folder = tmp_path_factory.mktemp("tables")
+    return {
+        kind: read_table(write_csv(picture.numbers, folder / f"{kind}.csv"))
+        for kind, picture in pictures.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def drawings(
+    pictures: dict[str, Picture], tables: dict[str, pd.DataFrame], small_demos: Demos
+) -> dict[str, Figure]:
+    """Draw each picture from its file, and a fit."""
+    result = fit(small_demos, params=Params.of(incorrect="all", episodes=200, horizon=50), seed=1)
+    return {
+        **{kind: picture.draw(tables[kind]) for kind, picture in pictures.items()},
+        "fit": maze.fit_figure(result),
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_picture_is_redrawn_by_its_code_and_its_file(
+    kind: str, pictures: dict[str, Picture], tables: dict[str, pd.DataFrame], tmp_path: Path
+) -> None:
+    """The named function draws from the file what it draws from the numbers, in any style.
+
+    Ten digits may shift the shade of a pixel by one step.
+    """
+    module, _, name = pictures[kind].code.rpartition(".")
+    draw: Callable[[pd.DataFrame], Figure] = getattr(importlib.import_module(module), name)
+    (exact,) = save_figure(draw(pictures[kind].numbers), tmp_path / "numbers", ["png"])
+    once = save_figure(draw(tables[kind]), tmp_path / "file")
+    with mpl.rc_context({"font.size": 20, "axes.facecolor": "black", "savefig.dpi": 30}):
+        again = save_figure(draw(tables[kind]), tmp_path / "styled")
+    for path, other in zip(once, again, strict=True):
+        assert path.read_bytes() == other.read_bytes()
+    shades = [np.asarray(Image.open(path).convert("RGB"), dtype=int) for path in (exact, once[0])]
+    assert np.abs(shades[0] - shades[1]).max() <= 1
+
+
+@pytest.mark.parametrize("kind", ["map", "fit"])
+def test_files_depend_on_the_figure_alone(
+    kind: str, drawings: dict[str, Figure], tmp_path: Path
+) -> None:
+    """Saving twice gives the same PNG and SVG, without a time or a version in them."""
+    once = [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / "a")]
+    twice = [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / "b")]
+    assert once == twice
+    assert b"Matplotlib" not in once[0]
+    assert b"dc:date" not in once[1]
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "fit"])
+def test_nothing_is_cut_off(kind: str, drawings: dict[str, Figure]) -> None:
+    """All that is drawn, texts included, lies within the figure."""
+    figure = drawings[kind]
+    box = figure.get_tightbbox(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+    width, height = figure.get_size_inches()
+    assert min(box.x0, box.y0) > -0.01
+    assert box.x1 < width + 0.01
+    assert box.y1 < height + 0.01
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "fit"])
+def test_legends_are_clear_of_the_panels(kind: str, drawings: dict[str, Figure]) -> None:
+    """No legend covers a panel or its labels."""
+    figure = drawings[kind]
+    for legend in figure.legends:
+        top = legend.get_window_extent().y1
+        boxes = [panel.get_tightbbox() for panel in figure.axes]
+        assert all(box is not None and box.y0 > top for box in boxes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_hold_keys(kind: str, tables: dict[str, pd.DataFrame]) -> None:
+    """Columns are plain names, and methods and readings are called by their keys."""
+    table = tables[kind]
+    assert all(name.isidentifier() for name in table.columns)
+    if "method" in table:
+        assert set(table["method"]) <= {"adaboost", "unified", "unified-incorrect"}
+        assert set(table["reading"]) <= {"", "printed", "updated"}
