@@ -1,4 +1,4 @@
-"""What the figures of claims share: scales, marks, rows in blocks, and legends."""
+"""What the figures of claims share: scales, marks, rows in blocks, legends, counts in words."""
 
 from __future__ import annotations
 
@@ -160,3 +160,19 @@ def reading_handles(numbers: pd.DataFrame) -> list[Artist]:
     """Return the legend's entries for the readings of Eq. 9 that a table has."""
     used = set(numbers["reading"])
     return [handle(F_LABELS[name], *READING_MARKS[name]) for name in READING_MARKS if name in used]
+
+
+# --- counts in words -----------------------------------------------------------------------------
+
+
+def holding(part: pd.DataFrame) -> str:
+    """Say in how many specifications a claim holds."""
+    holds = int((part["outcome"] == HOLDS).sum())
+    return f"{holds} of {len(part)} specifications ({100 * holds / len(part):.0f} %)"
+
+
+def counted(part: pd.DataFrame) -> str:
+    """Say in how many specifications a claim is open, and in how many reversed."""
+    return ", ".join(
+        f"{name} in {int((part['outcome'] == name).sum())}" for name in (OPEN, REVERSED)
+    )

@@ -315,7 +315,7 @@ def test_main_conditions_are_judged() -> None:
     ]
     trials = judged_trials(pd.concat(parts), judging)
     for (task, method), part in trials.groupby(["task", "method"]):
-        assert part["trial"].tolist() == list(range(judging.trials[task]))  # type: ignore[index]
+        assert part["trial"].tolist() == list(range(judging.trials[task]))
         assert set(part["set"]) == {"none" if method == "unified" else default[str(task)]}
 
 

@@ -19,7 +19,7 @@ from replication.evidence.specifications import (
     single_specifications,
 )
 from replication.evidence.tables import read_table, write_csv
-from replication.report import calibration, sensitivity, verdicts
+from replication.report import calibration, sensitivity, specification_curve, verdicts
 from replication.report.axes import OUTCOMES, UNITS
 from replication.report.picture import Picture
 from replication.report.style import save_figure
@@ -107,8 +107,8 @@ NUMBERS = pd.DataFrame(
 
 PICTURES = {
     "claims": verdicts.verdicts(VERDICTS),
-    "curve": sensitivity.curve(EFFECTS, DRAWN[0]),
-    "ratios": sensitivity.curve(EFFECTS, DRAWN[1]),
+    "curve": specification_curve.curve(EFFECTS, DRAWN[0]),
+    "ratios": specification_curve.curve(EFFECTS, DRAWN[1]),
     "single": sensitivity.single(EFFECTS, DRAWN),
     "soccer": sensitivity.single(EFFECTS, KICKED),
     "shares": sensitivity.shares(SHARES),
@@ -199,7 +199,7 @@ def test_curve_without_some_effects() -> None:
     broken = EFFECTS[EFFECTS["group"] == "factorial"].copy()
     row = broken["specification"] == FACTORIAL[0].name
     broken.loc[row, ["effect", "low", "high", "outcome"]] = [np.nan, np.nan, np.nan, "undefined"]
-    figure = drawn(sensitivity.curve(broken, DRAWN[1]))
+    figure = drawn(specification_curve.curve(broken, DRAWN[1]))
     (text,) = figure.axes[0].texts
     assert "of 239 specifications" in text.get_text()
     assert "239 specifications" in figure.axes[2].get_xlabel()
