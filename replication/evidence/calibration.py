@@ -1,23 +1,21 @@
 """The rule "Calibrated" of the register: defaults from one published pair of numbers.
 
-Where the text is silent on what every run behind Table I must have fixed, the defaults are the
-point of a declared grid under which the unified method without incorrect demonstrations comes
+Four choices that every run behind Table I must have made are not in the text. Their defaults are
+the point of a declared grid under which the unified method without incorrect demonstrations comes
 nearest to its published mean and SD on the open maze. ``choices.toml`` states the rule.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
 
 from replication.demos.maze_expert import Expert, demonstrate
 from replication.envs.maze import Maze
-from replication.evidence.experiments import F_LABELS
 from replication.evidence.statistics import mean_prediction, sd_interval, sd_prediction, summarise
 from replication.paper.params import Params
 from replication.paper.published import TABLE_1, Published
@@ -40,20 +38,14 @@ Point = tuple[Value, ...]
 
 
 def grid() -> list[Point]:
-    """Return all points: the registered values, but for the ablation ALPHA = 0."""
-    entries = [load_choices()[id] for id in CALIBRATED]
-    return list(
-        product(
-            *(
-                sorted(value for value in (one.default, *one.alternatives) if value != 0)
-                for one in entries
-            )
-        )
-    )
+    """Return all points: every registered value but the ablation ALPHA = 0."""
+    choices = [load_choices()[id] for id in CALIBRATED]
+    values = [(choice.default, *choice.alternatives) for choice in choices]
+    return list(product(*(sorted(v for v in accepted if v != 0) for accepted in values)))
 
 
 def chosen() -> Point:
-    """Return the point that the register's defaults are."""
+    """Return the point of the register's defaults."""
     return tuple(load_choices()[id].default for id in CALIBRATED)
 
 
@@ -71,7 +63,7 @@ def grid_conditions(maze: Maze) -> dict[Point, Condition]:
     }
 
 
-def divergence(mean: float, sd: float, published: Published) -> float:
+def kl_divergence(mean: float, sd: float, published: Published) -> float:
     """Return the Kullback-Leibler divergence of the normal N(mean, sd) from the published one.
 
     It is zero where both have the same mean and SD, and the less the likelier the published sample
@@ -79,9 +71,9 @@ def divergence(mean: float, sd: float, published: Published) -> float:
 
     Examples
     --------
-    >>> divergence(40.10, 4.73, PAIR)
+    >>> kl_divergence(40.10, 4.73, PAIR)
     0.0
-    >>> round(divergence(44.83, 4.73, PAIR), 3)
+    >>> round(kl_divergence(44.83, 4.73, PAIR), 3)
     0.5
     """
     if not sd > 0 or np.isnan(mean):
@@ -90,84 +82,65 @@ def divergence(mean: float, sd: float, published: Published) -> float:
     return float(np.log(sd / published.sd) + spread / (2 * sd**2) - 0.5)
 
 
-def findings(table: pd.DataFrame) -> str:
-    """Return in words how well the pair is met, and how little it decides."""
-    best = table.iloc[0]
-    n = int(best["n"])
-    low, high = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, n)
-    least, most = PAIR.sd * np.sqrt(stats.f.ppf([0.025, 0.975], n - 1, PAIR.n - 1))
-    near = table[
-        table["mean"].between(low, high) & table["sd"].between(least, most) & (table["capped"] == 0)
-    ]
-    values = "; ".join(
-        f"{id}: {', '.join(map(str, sorted(near[id].unique())))}" for id in CALIBRATED
-    )
-    ours = "our default" if best["default"] else "NOT our default"
-    return (
-        f"The nearest point is {ours}: {_named(best)}, with a mean of {best['mean']:.2f} "
-        f"(SD {best['sd']:.2f}) in {n} trials, where the paper has {PAIR.mean:.2f} ({PAIR.sd:.2f})."
-        f" But {len(near)} of the {len(table)} points have a mean and an SD where those of {n} "
-        f"trials from the published distribution would lie with 95 % each ({low:.1f} to "
-        f"{high:.1f}, and {least:.1f} to {most:.1f}). They have these values: {values}. So the "
-        "pair narrows the choices down and does not decide them."
-    )
-
-
-def _named(row: pd.Series) -> str:
-    return ", ".join(f"{id} = {row[id]}" for id in CALIBRATED)
-
-
 def calibration_table(results: Results, conditions: Mapping[Point, Condition]) -> pd.DataFrame:
     """Return one row a point, the nearest first, with its mean, SD and divergence."""
     rows = []
     for point, condition in conditions.items():
-        own = summarise(results.iterations(condition), results.converged(condition))
+        ours = summarise(results.iterations(condition), results.converged(condition))
         rows.append(
             {
                 **dict(zip(CALIBRATED, point, strict=True)),
-                "n": own.n,
-                "capped": own.capped,
-                "mean": own.mean,
-                "sd": own.sd,
-                "median": own.median,
-                "divergence": divergence(own.mean, own.sd, PAIR),
+                "n": ours.n,
+                "capped": ours.capped,
+                "mean": ours.mean,
+                "sd": ours.sd,
+                "median": ours.median,
+                "kl_divergence": kl_divergence(ours.mean, ours.sd, PAIR),
                 "default": point == chosen(),
+                "paper_mean": PAIR.mean,
+                "paper_sd": PAIR.sd,
             }
         )
-    return pd.DataFrame(rows).sort_values("divergence", kind="stable", ignore_index=True)
+    return pd.DataFrame(rows).sort_values("kl_divergence", kind="stable", ignore_index=True)
 
 
-def check_table(runs: Iterable[tuple[str, str, NDArray[np.float64]]]) -> pd.DataFrame:
-    """Return how near the chosen point comes to the pair in each of some runs.
+def check_table(grid_counts: NDArray[np.int64], trials: pd.DataFrame) -> pd.DataFrame:
+    """Return how near the chosen point comes to the pair: in the grid, and in new trials.
 
     Parameters
     ----------
-    runs
-        What the trials are, the reading of Eq. 9, and the iterations of each trial.
+    grid_counts
+        Iterations of the chosen point's trials in the grid, `[trial]`.
+    trials
+        The judged trials of the open maze, see :func:`replication.evidence.verdicts.judged_trials`.
 
     Returns
     -------
     DataFrame
         Mean and SD with their intervals, and where both would lie if the trials came from the
-        published distribution, as for the claims about published numbers.
+        published distribution, as for the claims about published numbers. One row for the grid, and
+        one for the new trials under each reading of Eq. 9.
     """
+    new = trials[trials["method"] == "unified"].groupby("reading", sort=False)["iterations"]
+    runs = [("grid", "printed", grid_counts.astype(float))]
+    runs += [("new", str(reading), rows.to_numpy(float)) for reading, rows in new]
     rows = []
-    for what, f, counts in runs:
-        own = summarise(counts, np.ones(len(counts)))
+    for source, reading, counts in runs:
+        ours = summarise(counts, np.ones(len(counts)))
         sd_low, sd_high = sd_interval(counts)
-        mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, own.n)
+        mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, ours.n)
         sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
         rows.append(
             {
-                "trials": what,
-                "F": f,
-                "n": own.n,
-                "mean": own.mean,
-                "low": own.low,
-                "high": own.high,
+                "trials": source,
+                "reading": reading,
+                "n": ours.n,
+                "mean": ours.mean,
+                "low": ours.low,
+                "high": ours.high,
                 "predicted_low": mean_from,
                 "predicted_high": mean_to,
-                "sd": own.sd,
+                "sd": ours.sd,
                 "sd_low": sd_low,
                 "sd_high": sd_high,
                 "sd_predicted_low": sd_from,
@@ -175,48 +148,3 @@ def check_table(runs: Iterable[tuple[str, str, NDArray[np.float64]]]) -> pd.Data
             }
         )
     return pd.DataFrame(rows)
-
-
-def readable_check(check: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of :func:`check_table` as a reader wants it."""
-    rows = []
-    for row in check.itertuples():
-        rows.append(
-            {
-                "Trials": f"{row.n}, {row.trials}",
-                "F": F_LABELS[row.F],
-                "Mean [95 %]": f"{row.mean:.2f} [{row.low:.2f}, {row.high:.2f}]",
-                "Due": f"{row.predicted_low:.2f} to {row.predicted_high:.2f}",
-                "SD [95 %]": f"{row.sd:.2f} [{row.sd_low:.2f}, {row.sd_high:.2f}]",
-                "SD due": f"{row.sd_predicted_low:.2f} to {row.sd_predicted_high:.2f}",
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def check_findings(check: pd.DataFrame) -> str:
-    """Return in words whether the chosen point keeps its nearness in new trials.
-
-    Parameters
-    ----------
-    check
-        Of :func:`check_table`: the grid's own trials, new ones, and new ones of the other reading.
-    """
-    old, new, other = check.itertuples()
-    mean = new.predicted_low <= new.mean <= new.predicted_high
-    sd = new.sd_predicted_low <= new.sd <= new.sd_predicted_high
-    lie = {
-        (True, True): "both lie where those of the published distribution would",
-        (True, False): "the mean lies where it would come from the published distribution, "
-        "the SD does not",
-        (False, True): "the SD lies where it would come from the published distribution, "
-        "the mean does not",
-        (False, False): "neither lies where it would come from the published distribution",
-    }[mean, sd]
-    return (
-        f"In the {old.n} trials of the grid the chosen point has a mean of {old.mean:.2f} "
-        f"(SD {old.sd:.2f}); in {new.n} new ones, {new.mean:.2f} ({new.sd:.2f}): {lie}. To take "
-        f"the best of {len(grid())} points, each known from {old.n} trials only, is to take a "
-        f"lucky one, and luck does not last. Only {F_LABELS[new.F]} was calibrated. "
-        f"{F_LABELS[other.F]} inherits the point, and has {other.mean:.2f} ({other.sd:.2f})."
-    )

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -24,6 +24,7 @@ from replication.paper.published import Published
 TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
 Reading = Literal["printed", "updated"]
 Measure = Literal["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
+MEASURES: tuple[str, ...] = get_args(Measure)
 Statistic = Literal[
     "mean-difference",
     "sd-ratio",
@@ -53,7 +54,37 @@ LABELS = {
     "Q-TO-GOAL": "Q grows toward the goal",
     "REWARD-TO-GOAL": "reward grows toward the goal",
 }
-"""What each comparative claim says, in a few words, and on which task."""
+"""What each comparative claim says, in a few words, and on which task; a claim may have none."""
+
+
+EVIDENCE = {
+    ("open-maze", "iterations"): "open_maze/contrasts",
+    ("open-maze", "converged"): "open_maze/fig05",
+    ("open-maze", "q_growth"): "open_maze/fig07",
+    ("open-maze", "q_slope"): "open_maze/fig07",
+    ("open-maze", "reward_slope"): "open_maze/fig07",
+    ("obstacle-maze", "iterations"): "obstacle_maze/contrasts",
+    ("obstacle-maze", "converged"): "obstacle_maze/fig09_errors",
+    ("soccer", "iterations"): "soccer/contrasts",
+    ("soccer", "converged"): "soccer/fig12",
+}
+"""The output, as notebook/name, that shows what a claim is judged on, by task and measure."""
+
+
+def evidence(task: str, measure: str) -> str:
+    """Return the output that shows a measure best; if there is none, the table of all trials.
+
+    Examples
+    --------
+    >>> evidence("soccer", "converged"), evidence("soccer", "early_errors")
+    ('soccer/fig12', 'soccer/trials')
+    """
+    return EVIDENCE.get((task, measure), f"{task.replace('-', '_')}/trials")
+
+
+def label(id: str) -> str:
+    """Return what a claim says in a few words; one without a label is called by its id."""
+    return LABELS.get(id, id)
 
 
 def short_label(id: str) -> str:
@@ -64,7 +95,7 @@ def short_label(id: str) -> str:
     >>> short_label("SAVES-OPEN")
     'saves iterations'
     """
-    return LABELS.get(id, id.lower()).partition(",")[0]
+    return label(id).partition(",")[0]
 
 
 class ClaimError(UserError):
@@ -78,8 +109,8 @@ class _Strict(BaseModel):
 class Claim(_Strict):
     """One claim of the paper; ``claims.toml`` explains the fields.
 
-    `paper` has mean, SD and number of trials by method; `used` says why no verdict is given, by
-    the reading of Eq. 9 or for all of them.
+    `paper` has mean, SD and number of trials by method; `used` gives the reason for no verdict, by
+    reading of Eq. 9 or for all of them.
     """
 
     id: str
@@ -127,7 +158,7 @@ class Claim(_Strict):
         """The published effect in the claim's own statistic, NaN where none is published."""
         if not self.paper:
             return math.nan
-        (mean, sd, _), *_ = (self.paper[self.x],)
+        mean, sd, _ = self.paper[self.x]
         if self.statistic == "mean-difference":
             return mean - self.paper[self.y][0]
         if self.statistic == "sd-ratio":
@@ -150,7 +181,7 @@ class Judging(_Strict):
         if self.confidence != CONFIDENCE:
             raise ValueError(
                 f"all intervals have a confidence of {CONFIDENCE}, not {self.confidence}; "
-                "change it in replication/statistics.py, too"
+                "change it in replication/evidence/statistics.py, too"
             )
         return self
 
@@ -171,12 +202,12 @@ class Claims(_Strict):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        ids = [one.id for one in self.claim]
-        for one in self.claim:
-            if ids.count(one.id) > 1:
-                raise ValueError(f"the claim {one.id!r} is there twice")
-            if one.task not in self.judging.trials:
-                raise ValueError(f"judging.trials has no {one.task!r}")
+        ids = [claim.id for claim in self.claim]
+        for claim in self.claim:
+            if ids.count(claim.id) > 1:
+                raise ValueError(f"the claim {claim.id!r} is there twice")
+            if claim.task not in self.judging.trials:
+                raise ValueError(f"judging.trials has no {claim.task!r}")
         if any(self.judging.root_seed in run.root_seeds for run in self.explored):
             seed = self.judging.root_seed
             raise ValueError(f"root seed {seed} was explored; judge by one that never was")
@@ -190,7 +221,7 @@ class Claims(_Strict):
         ClaimError
             If there is none with that id.
         """
-        known = {one.id: one for one in self.claim}
+        known = {claim.id: claim for claim in self.claim}
         if id not in known:
             raise ClaimError(unknown(id, known, "claim"))
         return known[id]
@@ -224,19 +255,19 @@ def parse_claims(text: str) -> Claims:
             name = entry.get("id", place[1]) if isinstance(entry, dict) else place[1]
             place[:2] = [f"claim {name}"]
         where = ", ".join(["claims.toml", ".".join(map(str, place))] if place else ["claims.toml"])
-        said = first["msg"].removeprefix("Value error, ")
+        message = first["msg"].removeprefix("Value error, ")
         if first["type"] not in ("value_error", "missing"):
-            said += f", not {first['input']!r:.80}"
-        raise ClaimError(f"{where}: {said}") from None
+            message += f", not {first['input']!r:.80}"
+        raise ClaimError(f"{where}: {message}") from None
 
 
 def criteria_hash() -> str:
-    """Return the hash of the frozen file, which stands beside every verdict."""
+    """Return the hash of the frozen file, which is written beside every verdict."""
     return canonical_hash(_text())
 
 
 def canonical_hash(text: str) -> str:
-    """Return the SHA-256 of what a TOML text says, whatever its layout, order and comments are."""
+    """Return the SHA-256 of the values of a TOML text: layout, order and comments do not count."""
     document = json.dumps(tomllib.loads(text), sort_keys=True, separators=(",", ":"), default=str)
     return hashlib.sha256(document.encode()).hexdigest()
 

@@ -1,49 +1,34 @@
 """The declared specifications: sets of choices under which the claims are evaluated again.
 
-The file ``specifications.toml`` declares them; this module reads it and makes conditions of them.
+The file ``specifications.toml`` declares them; this module reads and checks it.
+:mod:`replication.evidence.variations` makes conditions of them.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from replication.demos.checks import DemoError
 from replication.demos.files import load_demos
-from replication.demos.maze_expert import Expert, demonstrate
-from replication.demos.model import Demo, Demos
-from replication.demos.soccer_expert import SoccerExpert, demonstrate_soccer
-from replication.envs.maze import Maze, as_maze
-from replication.envs.soccer.field import SoccerField
 from replication.evidence.claims import ClaimError, load_claims
-from replication.evidence.experiments import (
-    EXPERIMENTS,
-    F_LABELS,
-    Key,
-    method_conditions,
-)
+from replication.evidence.experiments import EXPERIMENTS
 from replication.files import resolve
-from replication.irl import METHODS, READINGS
-from replication.irl.expectations import visited
-from replication.paper.params import Params
 from replication.paper.register import ChoiceError, Value, load_choices
-from replication.trials.condition import Condition
 
 MAPS = ("open", "obstacles", "random-1", "random-2", "random-3")
+DEFAULT = "default"
+"""The name of the specification that changes nothing."""
+
 RANDOM = "random"
 """As a value of DEMO-SHAPE: a shortest path drawn at random (DEMO-PATH = random-1)."""
-
-OBSTACLES = 30
-MOVES = 33
-"""Obstacle cells of a random maze, and the length of its shortest path."""
-
 
 Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0)]
@@ -112,8 +97,27 @@ class Specification:
 
     @property
     def name(self) -> str:
-        """The choices in words: `ID=value`, parted by blanks."""
-        return " ".join(f"{id}={value}" for id, value in self.choices) or "default"
+        """The choices in words, see :func:`named_choices`."""
+        return " ".join(f"{id}={value}" for id, value in self.choices) or DEFAULT
+
+
+def named_choices(name: str) -> dict[str, str]:
+    """Return the values, as text, that the name of a specification gives to its choices.
+
+    Examples
+    --------
+    >>> named_choices("MAP=open TIES=first"), named_choices("default")
+    ({'MAP': 'open', 'TIES': 'first'}, {})
+    """
+    return dict(word.split("=", 1) for word in name.split() if "=" in word)
+
+
+def sort_key(value: object) -> tuple[bool, float, str]:
+    """Return a key that sorts the values of a choice: numbers, also as text, before words."""
+    try:
+        return False, float(str(value)), ""
+    except ValueError:
+        return True, 0.0, str(value)
 
 
 # --- reading ---------------------------------------------------------------------------------
@@ -126,10 +130,10 @@ def load_specifications() -> Declared:
 
 
 def check_declared() -> None:
-    """Check the package's specifications as far as half a second goes, before anything runs.
+    """Run the fast checks of the package's specifications (half a second).
 
     Beside the file, these are the kinds of incorrect demonstrations, which the stored ones have to
-    have. To make all conditions takes twenty seconds: random mazes and soccer worlds are made anew.
+    have. Making all conditions takes twenty seconds: random mazes and soccer worlds are made anew.
 
     Raises
     ------
@@ -159,7 +163,7 @@ def parse_specifications(text: str) -> Declared:
         In one line that names the place, for what is unknown, missing or not accepted.
     """
     try:
-        found = Declared(**tomllib.loads(text))
+        plan = Declared(**tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise ChoiceError(f"specifications.toml is not TOML: {error}") from None
     except ValidationError as error:
@@ -167,8 +171,8 @@ def parse_specifications(text: str) -> Declared:
         place = ".".join(map(str, first["loc"]))
         raise ChoiceError(f"specifications.toml, {place}: {first['msg']}") from None
     for place, ids, task in (
-        ("mazes", found.mazes.claims, "open-maze"),
-        ("soccer", found.soccer.claims, "soccer"),
+        ("mazes", plan.mazes.claims, "open-maze"),
+        ("soccer", plan.soccer.claims, "soccer"),
     ):
         for id in ids:
             try:
@@ -176,12 +180,12 @@ def parse_specifications(text: str) -> Declared:
             except ClaimError as error:
                 raise ClaimError(f"specifications.toml, {place}.claims: {error}") from None
     tables = {
-        "mazes.single": found.mazes.single.choices,
-        "mazes.factorial": found.mazes.factorial.choices,
-        "soccer.single": found.soccer.single.choices,
+        "mazes.single": plan.mazes.single.choices,
+        "mazes.factorial": plan.mazes.factorial.choices,
+        "soccer.single": plan.soccer.single.choices,
         **{
-            f"ablations.traces[{n}]": {id: (value,) for id, value in one.items()}
-            for n, one in enumerate(found.ablations.traces)
+            f"ablations.traces[{n}]": {id: (value,) for id, value in trace.items()}
+            for n, trace in enumerate(plan.ablations.traces)
         },
     }
     for place, table in tables.items():
@@ -192,15 +196,17 @@ def parse_specifications(text: str) -> Declared:
                     _check_task(id, soccer=place == "soccer.single")
                 except ChoiceError as error:
                     raise ChoiceError(f"specifications.toml, {place}: {error}") from None
-    if 0 not in found.ablations.numbers:
-        raise ChoiceError("specifications.toml, ablations.numbers: add 0, which saving is against")
-    for id, values in found.mazes.factorial.choices.items():
-        if found.mazes.factorial.size % len(values):
+    if 0 not in plan.ablations.numbers:
+        raise ChoiceError(
+            "specifications.toml, ablations.numbers: add 0, against which savings are counted"
+        )
+    for id, values in plan.mazes.factorial.choices.items():
+        if plan.mazes.factorial.size % len(values):
             raise ChoiceError(
                 f"specifications.toml, mazes.factorial: {len(values)} values of {id} cannot be "
-                f"balanced over {found.mazes.factorial.size} specifications"
+                f"balanced over {plan.mazes.factorial.size} specifications"
             )
-    return found
+    return plan
 
 
 def _text() -> str:
@@ -253,7 +259,7 @@ def default_of(id: str) -> Value:
 def single_specifications(choices: Mapping[str, tuple[Value, ...]]) -> list[Specification]:
     """Return the default, and then one specification for each other value of each choice."""
     changed = [((id, value),) for id, values in choices.items() for value in values]
-    return [Specification("single", one) for one in ((), *changed)]
+    return [Specification("single", choices) for choices in ((), *changed)]
 
 
 def factorial_specifications(factorial: Factorial) -> list[Specification]:
@@ -271,182 +277,3 @@ def factorial_specifications(factorial: Factorial) -> list[Specification]:
         Specification("factorial", tuple(zip(columns, row, strict=True)))
         for row in zip(*columns.values(), strict=True)
     ]
-
-
-def maze_conditions(specification: Specification, cap: int) -> dict[Key, Condition]:
-    """Return the conditions of all methods in a maze, under the reading of Eq. 9 it chooses."""
-    choices = dict(specification.choices)
-    world = str(choices.pop("MAP", "open"))
-    expert: dict[str, Any] = {}
-    if choices.get("DEMO-SHAPE") == RANDOM:
-        del choices["DEMO-SHAPE"]
-        expert["path"] = "random-1"
-    for id in ("DEMO-SHAPE", "DEMO-PATH", "DETOUR-WIDTH"):
-        if id in choices:
-            expert[_name(id)] = choices.pop(id)
-    demos = _maze_demos(world, Expert(**expert))
-    return _chosen_reading(
-        demos, {"max_iterations": cap}, choices, EXPERIMENTS["open-maze"].methods
-    )
-
-
-def soccer_conditions(specification: Specification, cap: int) -> dict[Key, Condition]:
-    """Return the conditions of both methods in robot soccer; the world is made anew if it changes."""
-    choices = dict(specification.choices)
-    experiment = EXPERIMENTS["soccer"]
-    demos = load_demos(resolve(experiment.demos))
-    assert isinstance(demos.environment, SoccerField)
-    if "SOCCER-EPISODES" in choices:
-        choices["EPISODES"] = choices.pop("SOCCER-EPISODES")
-    world: dict[str, Any] = {}
-    for id in list(choices):
-        if load_choices()[id].field.startswith("SoccerParams."):
-            world[_name(id)] = choices.pop(id)
-    leave = choices.pop("SOCCER-INCORRECT", None)
-    if world or leave:
-        field = SoccerField(replace(demos.environment.params, **world))
-        params = SoccerExpert(leave=str(leave)) if leave else SoccerExpert()
-        demos = demonstrate_soccer(demos.task, field, params=params)
-    base = {**experiment.choices, "max_iterations": cap}
-    return _chosen_reading(demos, base, choices, experiment.methods)
-
-
-def _chosen_reading(
-    demos: Demos, base: Mapping[str, Any], choices: Mapping[str, Value], methods: tuple[str, ...]
-) -> dict[Key, Condition]:
-    values = {**base, **{_name(id): value for id, value in choices.items()}}
-    reading = values.pop("f_index", default_of("F-INDEX"))
-    conditions = method_conditions(demos, values, methods)
-    return {(name, f): one for (name, f), one in conditions.items() if f in ("", reading)}
-
-
-def _name(id: str) -> str:
-    """Return the name of the parameter that holds a choice."""
-    return load_choices()[id].field.split(".")[1]
-
-
-# --- mazes and demonstrations that are not stored ------------------------------------------------
-
-
-@cache
-def _maze_demos(world: str, expert: Expert) -> Demos:
-    task, maze = _world(world)
-    return demonstrate(task, maze, params=expert)
-
-
-@cache
-def _world(world: str) -> tuple[str, Maze]:
-    """Return the name of a maze's task, and the maze."""
-    stored = {"open": "open-maze", "obstacles": "obstacle-maze"}
-    if world in stored:
-        return stored[world], as_maze(
-            load_demos(resolve(EXPERIMENTS[stored[world]].demos)).environment
-        )
-    task = f"{world}-maze"
-    template = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
-    shapes = load_choices()["DEMO-SHAPE"]
-    experts = [Expert(leg=int(leg)) for leg in (shapes.default, *shapes.alternatives)]
-    experts.append(Expert(path="random-1"))
-    seed = np.random.SeedSequence(int(world.removeprefix("random-")))
-    for maze in random_mazes(as_maze(template.environment), seed=seed):
-        kinds = (demonstrate(task, maze, params=one).kinds for one in experts)
-        if all(set(one) == set(template.kinds) for one in kinds):
-            return task, maze
-    raise AssertionError("random mazes do not end")
-
-
-def random_mazes(
-    template: Maze, *, obstacles: int = OBSTACLES, moves: int = MOVES, seed: np.random.SeedSequence
-) -> Iterator[Maze]:
-    """Yield random mazes whose shortest path has the given number of moves, without end.
-
-    Parameters
-    ----------
-    template
-        Gives the size, the start and the goal; its obstacles are not kept.
-    obstacles
-        Number of obstacle cells, drawn without replacement from all others.
-    moves
-        Length of the shortest path.
-    seed
-        Of the draws.
-    """
-    rng = np.random.default_rng(seed)
-    rows, columns = template.shape
-    free = [cell for cell in range(rows * columns) if cell not in (template.start, template.goal)]
-    while True:
-        cells = np.full(rows * columns, ".")
-        cells[rng.choice(free, size=obstacles, replace=False)] = "#"
-        cells[[template.start, template.goal]] = "S", "G"
-        try:
-            maze = Maze(tuple("".join(row) for row in cells.reshape(rows, columns)))
-        except ValueError:  # the goal cannot be reached
-            continue
-        if maze.distances()[maze.start] == moves:
-            yield maze
-
-
-def trace_conditions(ablations: Ablations, cap: int) -> dict[str, Condition]:
-    """Return the default and the ablations of the trace, by what they are.
-
-    They are those of the unified method without and with incorrect demonstrations, under both
-    readings of Eq. 9. While the trace stays as it is, the readings differ in marked pairs alone.
-    """
-    found = {}
-    for changed in ({}, *ablations.traces):
-        choices = tuple(changed.items())
-        for reading in READINGS:
-            one = Specification("ablation", (*choices, ("F-INDEX", reading)))
-            for (method, _), condition in maze_conditions(one, cap).items():
-                if method != "adaboost":
-                    name = Specification("ablation", choices).name
-                    label = METHODS[method].label
-                    found[f"{label}, {F_LABELS[reading]}, {name}"] = condition
-    return found
-
-
-def numbered_conditions(ablations: Ablations, cap: int) -> dict[tuple[int, str], Condition]:
-    """Return conditions with ever more incorrect demonstrations, from none to all pairs.
-
-    Keys are the number of demonstrations and the reading of Eq. 9.
-    """
-    demos = _maze_demos("open", Expert())
-    every = _each_wrong_pair(demos, np.random.SeedSequence(ablations.seed))
-    found = {}
-    for number in ablations.numbers:
-        n = len(every) if number == "all" else number
-        some = replace(demos, incorrect=tuple(every[:n]))
-        method = "unified-incorrect" if n else "unified"
-        for f in READINGS:
-            params = Params.of(f_index=f, max_iterations=cap, incorrect="all" if n else "none")
-            found[n, f] = Condition(some, method, params)
-    return found
-
-
-def _each_wrong_pair(demos: Demos, seed: np.random.SeedSequence) -> list[Demo]:
-    """Return a demonstration of each pair that the expert does not take, in random order.
-
-    It is a shortest path from the start to the pair's state, and then the pair's action.
-    """
-    maze = as_maze(demos.environment)
-    right = visited(demos.correct, shape=(maze.n_states, maze.n_actions))
-    ways: dict[int, list[int]] = {maze.start: []}
-    waiting = [maze.start]
-    for state in waiting:  # grows while it is read
-        for action, there in enumerate(maze.next_state[state].tolist()):
-            if there not in ways and state != maze.goal:
-                ways[there] = [*ways[state], action]
-                waiting.append(there)
-    pairs = [
-        (state, action)
-        for state in ways
-        if state != maze.goal
-        for action in range(maze.n_actions)
-        if not right[state, action]
-    ]
-    order = np.random.default_rng(seed).permutation(len(pairs))
-    found = []
-    for number, (state, action) in enumerate(pairs[at] for at in order.tolist()):
-        actions = [*ways[state], action]
-        found.append(Demo(f"pair-{number}", "pair", maze.replay(actions), np.array(actions)))
-    return found

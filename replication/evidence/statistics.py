@@ -1,8 +1,8 @@
-"""Statistics of what trials give: summaries, paired comparisons, intervals and predictions.
+"""Statistics of trials: summaries, paired comparisons, intervals and predictions.
 
 All methods share their seeds, so comparisons are paired by trial. Intervals are 95 %. A trial that
-ended at the iteration cap has no count: where there is one, means are not computed and a comparison
-is not testable.
+ended at the iteration cap has no count: if there is one, means are not computed and a comparison is
+not testable.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FEWEST = 30
 
 @dataclass(frozen=True)
 class Summary:
-    """Iterations of one condition; `mean`, `sd` and the mean's interval are NaN if any are capped."""
+    """Iterations of one condition; mean, SD and the mean's interval are NaN if any are capped."""
 
     n: int
     capped: int
@@ -112,7 +112,9 @@ def compare(
     equal = bool((a == b).all())
     flat = a.std() == 0 or b.std() == 0
     few = flat or len(a) < FEWEST
-    sd_low, sd_high = (np.nan, np.nan) if few else _bootstrap((a, b), _sd_ratio)
+    sd_bounds: Any = (np.nan, np.nan)
+    if not few:
+        sd_bounds = _bootstrap((a, b), _sd_ratio, RESAMPLES, rounding=1e-12)
     moments = [moment for s in (a, b) for moment in (s.mean(), s.std(ddof=1), len(s))]
     with np.errstate(divide="ignore", invalid="ignore"):  # samples that do not spread
         welch = stats.ttest_ind_from_stats(*moments, equal_var=False).pvalue
@@ -125,8 +127,8 @@ def compare(
         p_welch=1.0 if equal else float(welch),
         p_wilcoxon=1.0 if equal else float(stats.wilcoxon(a, b).pvalue),
         sd_ratio=np.nan if flat else float(_sd_ratio(a, b)),
-        sd_low=sd_low,
-        sd_high=sd_high,
+        sd_low=float(sd_bounds[0]),
+        sd_high=float(sd_bounds[1]),
         p_spread=np.nan if flat else float(spread),
         power=power(float(np.hypot(a.std(ddof=1), b.std(ddof=1))), len(a), published),
         n=len(a),
@@ -137,18 +139,13 @@ def mean_interval(differences: NDArray[np.float64]) -> tuple[float, float]:
     """Return the BCa bootstrap interval of a mean; a constant sample is its own interval."""
     if np.ptp(differences) == 0:
         return float(differences[0]), float(differences[0])
-    return _bootstrap((differences,), np.mean)
-
-
-def _sd_ratio(
-    a: NDArray[np.float64], b: NDArray[np.float64], axis: int = -1
-) -> NDArray[np.float64]:
-    return np.std(a, axis=axis, ddof=1) / np.std(b, axis=axis, ddof=1)
+    low, high = _bootstrap((differences,), np.mean, RESAMPLES)
+    return float(low), float(high)
 
 
 def mean_intervals(samples: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the BCa intervals of many means at once: bounds [sample] of values [sample, trial]."""
-    return _bootstrap_many((samples,), np.mean)
+    return _bootstrap((samples,), np.mean, RESAMPLES_OF_MANY)
 
 
 def sd_ratio_intervals(
@@ -157,7 +154,7 @@ def sd_ratio_intervals(
     """Return many ratios of SDs at once, with their BCa intervals; NaN where either is constant."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _sd_ratio(x, y)
-    low, high = _bootstrap_many((x, y), _sd_ratio)
+    low, high = _bootstrap((x, y), _sd_ratio, RESAMPLES_OF_MANY)
     bounds = np.array([ratio, low, high])
     bounds[:, ~np.isfinite(bounds).all(axis=0) | (ratio == 0)] = np.nan
     return bounds[0], bounds[1], bounds[2]
@@ -168,49 +165,42 @@ def standard_errors(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
     return (high - low) / (2 * _normal())
 
 
-def _bootstrap_many(
-    samples: tuple[NDArray[np.float64], ...], statistic: Callable[..., Any]
+def _sd_ratio(
+    a: NDArray[np.float64], b: NDArray[np.float64], axis: int = -1
+) -> NDArray[np.float64]:
+    return np.std(a, axis=axis, ddof=1) / np.std(b, axis=axis, ddof=1)
+
+
+def _bootstrap(
+    samples: tuple[NDArray[np.float64], ...],
+    statistic: Callable[..., Any],
+    resamples: int,
+    *,
+    rounding: float = 0.0,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return BCa intervals row by row; a statistic that no resample changes is its own interval."""
+    """Return the BCa interval of a statistic along the last axis, trials resampled together.
+
+    A statistic that no resample changes, by more than the relative error `rounding`, is its own
+    interval.
+    """
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        found = stats.bootstrap(
+        result = stats.bootstrap(
             samples,
             statistic,
             axis=-1,
             paired=True,
             vectorized=True,
             confidence_level=CONFIDENCE,
-            n_resamples=RESAMPLES_OF_MANY,
+            n_resamples=resamples,
             method="BCa",
             rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
         )
         estimate = statistic(*samples, axis=-1)
-        flat = np.ptp(found.bootstrap_distribution, axis=-1) == 0
-    low = np.where(flat, estimate, found.confidence_interval.low)
-    return low, np.where(flat, estimate, found.confidence_interval.high)
-
-
-def _bootstrap(
-    samples: tuple[NDArray[np.float64], ...], statistic: Callable[..., Any]
-) -> tuple[float, float]:
-    """Return the BCa interval of a statistic, trials resampled together."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # no resample changes it
-        found = stats.bootstrap(
-            samples,
-            statistic,
-            paired=True,
-            vectorized=True,
-            confidence_level=CONFIDENCE,
-            n_resamples=RESAMPLES,
-            method="BCa",
-            rng=np.random.default_rng(np.random.SeedSequence(BOOTSTRAP_SEED)),
-        )
-    spread = found.bootstrap_distribution
-    if np.ptp(spread) <= 1e-12 * abs(spread[0]):
-        return float(spread[0]), float(spread[0])
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+        resampled = result.bootstrap_distribution
+        flat = np.ptp(resampled, axis=-1) <= rounding * np.abs(resampled[..., 0])
+    interval = result.confidence_interval
+    return np.where(flat, estimate, interval.low), np.where(flat, estimate, interval.high)
 
 
 def power(sd: float, n: int, effect: float) -> float:
@@ -239,13 +229,13 @@ def mean_prediction(mean: float, sd: float, n: int, m: int) -> tuple[float, floa
     return float(mean - half), float(mean + half)
 
 
-def sd_prediction(sd: float, n: int, own: NDArray[np.float64]) -> tuple[float, float]:
-    """Return where the SD of a sample as large as `own` should lie, given `n` with this SD.
+def sd_prediction(sd: float, n: int, sample: NDArray[np.float64]) -> tuple[float, float]:
+    """Return where the SD of `sample` should lie, given the SD of `n` trials before.
 
     The logarithm of an SD is taken as normal, with the variance (kurtosis - 1) / (4 n) that it has
-    for large samples, and both samples with the kurtosis of `own`.
+    for large samples, and both samples with the kurtosis of `sample`.
     """
-    half = _normal() * np.sqrt(_log_sd_variance(own) * (1 + len(own) / n))
+    half = _normal() * np.sqrt(_log_sd_variance(sample) * (1 + len(sample) / n))
     return float(sd * np.exp(-half)), float(sd * np.exp(half))
 
 
@@ -273,8 +263,8 @@ def share_interval(k: int, n: int) -> tuple[float, float]:
     >>> [round(x, 3) for x in share_interval(100, 100)]
     [0.964, 1.0]
     """
-    found = stats.binomtest(k, n).proportion_ci(CONFIDENCE)
-    return float(found.low), float(found.high)
+    interval = stats.binomtest(k, n).proportion_ci(CONFIDENCE)
+    return float(interval.low), float(interval.high)
 
 
 def holm(p_values: Sequence[float]) -> NDArray[np.float64]:

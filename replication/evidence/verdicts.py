@@ -1,14 +1,16 @@
-"""Judge the paper's claims from the trials, by the frozen criteria of :mod:`replication.evidence.claims`."""
+"""Judge the paper's claims by the frozen criteria of :mod:`replication.evidence.claims`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from replication.evidence.claims import Claim, Claims, Judging, criteria_hash
+from replication.evidence.claims import Claim, ClaimError, Claims, Judging, criteria_hash
+from replication.evidence.experiments import EXPERIMENTS, main_trials, under
 from replication.evidence.statistics import (
     compare,
     holm,
@@ -18,6 +20,7 @@ from replication.evidence.statistics import (
     share_interval,
     summarise,
 )
+from replication.evidence.tables import read_table
 
 REPRODUCED = "reproduced"
 PARTLY = "partly"
@@ -27,13 +30,34 @@ NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable"
 
 
+def read_trials(figures: Path) -> pd.DataFrame:
+    """Return the tables ``trials.csv`` of all experiments, one below the other."""
+    folders = [figures / task.replace("-", "_") for task in EXPERIMENTS]
+    return pd.concat([read_table(folder / "trials.csv") for folder in folders], ignore_index=True)
+
+
+def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:
+    """Return the trials that count: those of the main conditions, as many as are to be judged.
+
+    Parameters
+    ----------
+    trials
+        Of :func:`read_trials`, or one of the tables.
+    judging
+        How many trials of each task are judged.
+    """
+    main = main_trials(trials)
+    return main[main["trial"] < main["task"].map(dict(judging.trials))]
+
+
 def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
     """Return one row for each claim and reading of Eq. 9, with its verdict.
 
     Parameters
     ----------
     measures
-        Rows of :func:`replication.trials.measures.measure_trials` for all tasks.
+        The trials of all tasks, see :func:`judged_trials`; the columns are those of
+        :func:`replication.trials.measures.measure_trials`.
     claims
         What to judge, and how.
 
@@ -46,15 +70,19 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
         counting half; `power` that of finding an effect as large as the published one. `p_holm` is
         adjusted over all tests of the table. `why` is empty for what is reproduced or reversed.
         `criteria` is the hash of the frozen file.
+
+    Raises
+    ------
+    ClaimError
+        If a method that a claim is about has no trials.
     """
-    rows = []
-    for claim in claims.claim:
-        x = measures[(measures["task"] == claim.task) & (measures["method"] == claim.x)]
-        if x.empty:
-            raise KeyError(f"no trials of {claim.x} on {claim.task}")
-        for f in [f for f in (*claims.judging.readings, "") if f in set(x["F"])]:
-            rows.append(_row(claim, f, measures, claims.judging))
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame(
+        [
+            _row(claim, reading, measures)
+            for claim in claims.claim
+            for reading in _readings(measures, claim, claims.judging)
+        ]
+    )
     table["p_holm"] = np.nan
     tested = table["p"].notna()
     table.loc[tested, "p_holm"] = holm(table.loc[tested, "p"].tolist())
@@ -106,15 +134,21 @@ def decide(low: float, high: float, margin: float, direction: str, p: float, lev
     return REPRODUCED if (high < margin) == (direction == "less") else REVERSED
 
 
-def _row(claim: Claim, f: str, measures: pd.DataFrame, judging: Judging) -> dict[str, Any]:
-    x = _trials(measures, claim.task, claim.x, f)
-    y = _trials(measures, claim.task, claim.y, f) if claim.y else x
+def _readings(measures: pd.DataFrame, claim: Claim, judging: Judging) -> list[str]:
+    """Return the readings of Eq. 9 that the first method of a claim was run under."""
+    used = set(_trials_of(measures, claim.task, claim.x)["reading"])
+    return [reading for reading in (*judging.readings, "") if reading in used]
+
+
+def _row(claim: Claim, reading: str, measures: pd.DataFrame) -> dict[str, Any]:
+    x = _paired(measures, claim.task, claim.x, reading)
+    y = _paired(measures, claim.task, claim.y, reading) if claim.y else x
     row: dict[str, Any] = {
         "id": claim.id,
         "claim": claim.claim,
         "place": claim.place,
         "task": claim.task,
-        "F": f,
+        "reading": reading,
         "measure": claim.measure,
         "statistic": claim.statistic,
         "x": claim.x,
@@ -143,23 +177,23 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
     if claim.statistic in ("mean-difference", "mean"):
         published = claim.paper_effect if claim.paper else np.nan
         against = b if claim.y else np.full(len(a), claim.margin)
-        found = compare(a, against, published=published)
+        result = compare(a, against, published=published)
         shift = 0.0 if claim.y else claim.margin
         return {
-            "effect": found.difference + shift,
-            "low": found.low + shift,
-            "high": found.high + shift,
-            "fewer": found.fewer if claim.y else np.nan,
-            "p": found.p_wilcoxon,
-            "power": found.power,
+            "effect": result.difference + shift,
+            "low": result.low + shift,
+            "high": result.high + shift,
+            "fewer": result.fewer if claim.y else np.nan,
+            "p": result.p_wilcoxon,
+            "power": result.power,
         }
     if claim.statistic == "sd-ratio":
-        found = compare(a, b)
+        result = compare(a, b)
         return {
-            "effect": found.sd_ratio,
-            "low": found.sd_low,
-            "high": found.sd_high,
-            "p": found.p_spread,
+            "effect": result.sd_ratio,
+            "low": result.sd_low,
+            "high": result.sd_high,
+            "p": result.p_spread,
         }
     ours = summarise(a, x["converged"])
     if claim.statistic == "published-run":
@@ -176,8 +210,8 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
 
 
 def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
-    """Return the verdict on a row, and why it is not a plain one."""
-    used = claim.used.get("all") or claim.used.get(row.F or "all")
+    """Return the verdict on a row, and the reason unless it is reproduced or reversed."""
+    used = claim.used.get("all") or claim.used.get(row.reading or "all")
     if used:
         return NOT_TESTABLE, used
     if row.n < judging.fewest:
@@ -194,27 +228,31 @@ def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
         if row.predicted_low <= row.effect <= row.predicted_high:
             return REPRODUCED, ""
         return NOT_REPRODUCED, "ours lies outside the range that the paper's predicts"
-    found = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
+    verdict = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
     excluded = not row.low <= claim.margin <= row.high
-    if found == UNDECIDED and excluded:
-        return found, "the interval excludes the margin, but the test does not reject"
-    if found == UNDECIDED:
-        return found, "the test rejects, but the interval includes the margin"
-    if found != NOT_REPRODUCED:
-        return found, ""
+    if verdict == UNDECIDED and excluded:
+        return verdict, "the interval excludes the margin, but the test does not reject"
+    if verdict == UNDECIDED:
+        return verdict, "the test rejects, but the interval includes the margin"
+    if verdict != NOT_REPRODUCED:
+        return verdict, ""
     if np.isnan(row.paper):
-        return found, "the interval includes the margin"
+        return verdict, "the interval includes the margin"
     included = "and" if row.low <= row.paper <= row.high else "but not"
-    return found, f"the interval includes the margin, {included} the published effect"
+    return verdict, f"the interval includes the margin, {included} the published effect"
 
 
-def _trials(measures: pd.DataFrame, task: str, method: str, f: str) -> pd.DataFrame:
-    """Return the rows of a method under a reading of Eq. 9, or its only ones without a trace."""
-    own = measures[(measures["task"] == task) & (measures["method"] == method)]
-    chosen = own[own["F"] == f] if f in set(own["F"]) else own[own["F"] == ""]
-    if chosen.empty:
-        raise KeyError(f"no trials of {method} on {task}")
-    return chosen.sort_values("trial")
+def _trials_of(measures: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
+    rows = measures[(measures["task"] == task) & (measures["method"] == method)]
+    if rows.empty:
+        notebook = task.replace("-", "_")
+        raise ClaimError(f"no trials of {method} on {task}: run the notebook {notebook} first")
+    return rows
+
+
+def _paired(measures: pd.DataFrame, task: str, method: str, reading: str) -> pd.DataFrame:
+    """Return a method's trials in order; without a trace it has the same under each reading."""
+    return under(_trials_of(measures, task, method), reading).sort_values("trial")
 
 
 def by_claim(table: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:

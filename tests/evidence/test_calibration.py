@@ -17,16 +17,14 @@ from replication.evidence.calibration import (
     ROOT,
     TRIALS,
     calibration_table,
-    check_findings,
     check_table,
     chosen,
-    divergence,
-    findings,
     grid,
     grid_conditions,
-    readable_check,
+    kl_divergence,
 )
 from replication.evidence.claims import load_claims
+from replication.evidence.statistics import mean_prediction
 from replication.evidence.tables import read_table
 from replication.files import PROJECT
 from replication.paper.published import Published
@@ -34,52 +32,53 @@ from replication.paper.register import load_choices
 from replication.trials.run import run_trials
 from replication.trials.store import Store
 
-STORED = PROJECT / "figures" / "calibration.csv"
+FIGURES = PROJECT / "figures"
 
 
 @pytest.fixture(scope="module")
 def stored() -> pd.DataFrame:
     """Read the published grid."""
-    if not STORED.exists():
-        pytest.skip("figures/calibration.csv is not published yet")
-    return read_table(STORED)
+    path = FIGURES / "calibration" / "grid.csv"
+    if not path.exists():
+        pytest.skip("figures/calibration is not published yet")
+    return read_table(path)
 
 
 # --- the criterion ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("mean", "sd"), [(40.1, 4.73), (39.1, 5.2), (45.0, 3.0), (30.0, 9.0)])
-def test_divergence_by_integration(mean: float, sd: float) -> None:
+def test_kl_divergence_by_integration(mean: float, sd: float) -> None:
     """The closed form is the integral of p log(p / q), p being the published distribution."""
     p, q = stats.norm(PAIR.mean, PAIR.sd), stats.norm(mean, sd)
-    due, _ = integrate.quad(
+    expected, _ = integrate.quad(
         lambda x: p.pdf(x) * (p.logpdf(x) - q.logpdf(x)),
         PAIR.mean - 12 * PAIR.sd,
         PAIR.mean + 12 * PAIR.sd,
     )
-    assert divergence(mean, sd, PAIR) == pytest.approx(due, abs=1e-7)
+    assert kl_divergence(mean, sd, PAIR) == pytest.approx(expected, abs=1e-7)
 
 
 @given(st.floats(1, 100), st.floats(0.1, 50), st.floats(1, 100), st.floats(0.1, 50))
-def test_divergence_is_least_at_the_published_pair(
+def test_kl_divergence_is_least_at_the_published_pair(
     mean: float, sd: float, paper_mean: float, paper_sd: float
 ) -> None:
     """It is zero at the pair itself, nowhere below, and grows with the distance of the means."""
     paper = Published("here", paper_mean, paper_sd)
-    assert divergence(paper_mean, paper_sd, paper) == pytest.approx(0.0, abs=1e-12)
-    assert divergence(mean, sd, paper) >= -1e-12
+    assert kl_divergence(paper_mean, paper_sd, paper) == pytest.approx(0.0, abs=1e-12)
+    assert kl_divergence(mean, sd, paper) >= -1e-12
     further = paper_mean + 2 * (mean - paper_mean)
-    assert divergence(further, sd, paper) >= divergence(mean, sd, paper)
+    assert kl_divergence(further, sd, paper) >= kl_divergence(mean, sd, paper)
 
 
-def test_divergence_is_the_likelihood_of_the_published_sample() -> None:
+def test_kl_divergence_is_the_likelihood_of_the_published_sample() -> None:
     """Of two points the nearer one makes a sample with the published mean and SD likelier."""
     sample = stats.zscore(np.random.default_rng(1).normal(size=100)) * PAIR.sd + PAIR.mean
     points = [(39.1, 5.2), (41.0, 4.0), (36.0, 4.7), (40.1, 9.0)]
     likelihoods = [stats.norm(*point).logpdf(sample).mean() for point in points]
-    divergences = [divergence(*point, PAIR) for point in points]
+    kl_divergences = [kl_divergence(*point, PAIR) for point in points]
     for (a, one), (b, other) in itertools.combinations(
-        zip(likelihoods, divergences, strict=True), 2
+        zip(likelihoods, kl_divergences, strict=True), 2
     ):
         assert a - b == pytest.approx(other - one)
 
@@ -87,7 +86,7 @@ def test_divergence_is_the_likelihood_of_the_published_sample() -> None:
 @pytest.mark.parametrize(("mean", "sd"), [(40.1, 0.0), (np.nan, np.nan), (40.1, np.nan)])
 def test_points_that_are_out_are_infinitely_far(mean: float, sd: float) -> None:
     """A point without any spread, or with a trial at the cap, is never the nearest."""
-    assert divergence(mean, sd, PAIR) == np.inf
+    assert kl_divergence(mean, sd, PAIR) == np.inf
 
 
 # --- the grid --------------------------------------------------------------------------------
@@ -118,8 +117,8 @@ def test_calibration_is_apart_from_the_judging_run() -> None:
         assert claim.published("unified").mean == PAIR.mean
 
 
-def test_settings_differ_in_the_grid_alone(small_demos: Demos) -> None:
-    """Each point is a condition of the unified method with its four values, all else at defaults."""
+def test_conditions_differ_in_the_grid_alone(small_demos: Demos) -> None:
+    """Each point is the unified method with its four values, and all else at defaults."""
     conditions = grid_conditions(as_maze(small_demos.environment))
     assert list(conditions) == grid()
     for (leg, alpha, f_start, ties), condition in conditions.items():
@@ -142,94 +141,41 @@ def test_table_of_a_run(small_demos: Demos, tmp_path: object) -> None:
     results = run_trials(list(conditions.values()), trials=4, store=store, seed=ROOT)
     table = calibration_table(results, conditions)
     assert table["default"].sum() == 1
-    assert table["divergence"].is_monotonic_increasing
+    assert table["kl_divergence"].is_monotonic_increasing
     for row in table.to_dict("records"):
         condition = conditions[tuple(row[id] for id in CALIBRATED)]
         counts = results.iterations(condition)
         assert (row["n"], row["capped"]) == (4, 0)
         assert row["mean"] == pytest.approx(counts.mean())
         assert row["sd"] == pytest.approx(counts.std(ddof=1))
-        assert row["divergence"] == divergence(row["mean"], row["sd"], PAIR)
+        assert row["kl_divergence"] == kl_divergence(row["mean"], row["sd"], PAIR)
         assert row["default"] == (condition is conditions[chosen()])
 
 
-# --- what is said of it ----------------------------------------------------------------------
+# --- the check -------------------------------------------------------------------------------
 
 
-def near(table: pd.DataFrame) -> pd.Series:
-    """Return which points have both numbers where those of a sample of the paper's would lie."""
-    n = int(table["n"].iloc[0])
-    half = stats.t.ppf(0.975, PAIR.n - 1) * PAIR.sd * (1 / n + 1 / PAIR.n) ** 0.5
-    ratio = (table["sd"] / PAIR.sd) ** 2  # of variances: F with n - 1 and 99 degrees of freedom
-    inside = ratio.between(*stats.f(n - 1, PAIR.n - 1).interval(0.95))
-    return ((table["mean"] - PAIR.mean).abs() <= half) & inside & (table["capped"] == 0)
-
-
-def made_up() -> pd.DataFrame:
-    """Make a table of the grid up."""
-    rng = np.random.default_rng(4)
-    table = pd.DataFrame(grid(), columns=list(CALIBRATED))
-    table["n"], table["capped"] = TRIALS, 0
-    table["mean"], table["sd"] = rng.normal(40, 3, 120), rng.uniform(2, 8, 120)
-    table["median"] = table["mean"]
-    capped = table.index % 7 == 0
-    table.loc[capped, ["mean", "sd"]] = np.nan
-    table.loc[capped, "capped"] = 2
-    table["divergence"] = [
-        divergence(*row, PAIR) for row in zip(table["mean"], table["sd"], strict=True)
-    ]
-    table["default"] = [point == chosen() for point in grid()]
-    return table.sort_values("divergence", ignore_index=True)
-
-
-def test_findings_count_the_points_that_would_do() -> None:
-    """The number of points and their values are those of a recount; the best one is named."""
-    table = made_up()
-    text = findings(table)
-    assert 0 < near(table).sum() < 120
-    assert f"But {near(table).sum()} of the 120 points" in text
-    best = table.iloc[0]
-    assert f"mean of {best['mean']:.2f} (SD {best['sd']:.2f}) in {TRIALS} trials" in text
-    assert ", ".join(f"{id} = {best[id]}" for id in CALIBRATED) in text
-    for id in CALIBRATED:
-        values = sorted(table[near(table)][id].unique())
-        assert f"{id}: {', '.join(map(str, values))}" in text
-    assert "The nearest point is " + ("our" if best["default"] else "NOT our") in text
-
-
-def test_findings_say_whether_the_nearest_is_the_default() -> None:
-    """It says so if the nearest point is not what the register has."""
-    table = made_up()
-    table["default"] = False
-    assert findings(table).startswith("The nearest point is NOT our default: ")
-    table.loc[0, "default"] = True
-    assert findings(table).startswith("The nearest point is our default: ")
-
-
-@pytest.mark.parametrize(
-    ("shift", "scale", "said"),
-    [
-        (0.0, 1.0, "both lie where"),
-        (0.0, 2.0, "the mean lies where"),
-        (3.0, 1.0, "the SD lies where"),
-        (-3.0, 2.0, "neither lies where"),
-    ],
-)
-def test_check_says_what_is_left_of_the_nearness(shift: float, scale: float, said: str) -> None:
-    """Mean and SD of new trials are each held against where they would lie."""
+def test_check_holds_new_trials_against_the_published_distribution() -> None:
+    """The grid's trials have a row, and the new ones of the method one for each reading."""
     draw = np.random.default_rng(1).normal(size=100)
-    draw = (draw - draw.mean()) / draw.std(ddof=1)
-    new = PAIR.mean + shift + scale * PAIR.sd * draw
-    runs = [("of the grid", "printed", new[:30]), ("new", "printed", new), ("new", "updated", draw)]
-    check = check_table(runs)
-    assert said in check_findings(check)
-    assert "best of 120 points, each known from 30 trials" in check_findings(check)
+    draw = PAIR.mean + PAIR.sd * (draw - draw.mean()) / draw.std(ddof=1)
+    trials = pd.DataFrame(
+        {
+            "method": ["unified"] * 200 + ["unified-incorrect"] * 100,
+            "reading": ["printed"] * 100 + ["updated"] * 100 + ["printed"] * 100,
+            "iterations": [*draw, *(draw + 3), *(draw + 9)],
+        }
+    )
+    check = check_table(draw[:30].astype(int), trials)
+    assert check["trials"].tolist() == ["grid", "new", "new"]
+    assert check["reading"].tolist() == ["printed", "printed", "updated"]
     assert check["n"].tolist() == [30, 100, 100]
-    row = check.iloc[1]
-    assert (row["mean"], row["sd"]) == pytest.approx((PAIR.mean + shift, scale * PAIR.sd))
-    assert row["low"] < row["mean"] < row["high"]
-    assert row["sd_low"] < row["sd"] < row["sd_high"]
-    assert readable_check(check)["Trials"].tolist() == ["30, of the grid", "100, new", "100, new"]
+    assert check["mean"].tolist()[1:] == pytest.approx([PAIR.mean, PAIR.mean + 3])
+    assert check["sd"].tolist()[1:] == pytest.approx([PAIR.sd] * 2)
+    for name, low, high in (("mean", "low", "high"), ("sd", "sd_low", "sd_high")):
+        assert ((check[low] < check[name]) & (check[name] < check[high])).all()
+    expected = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, 100)
+    assert check.loc[1, ["predicted_low", "predicted_high"]].tolist() == pytest.approx(expected)
 
 
 # --- the published grid ----------------------------------------------------------------------
@@ -246,20 +192,15 @@ def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
     points = set(stored[list(CALIBRATED)].itertuples(index=False, name=None))
     assert points == set(grid())
     assert set(stored["n"]) == {TRIALS}
-    assert stored["divergence"].is_monotonic_increasing
-    due = [divergence(*row, PAIR) for row in zip(stored["mean"], stored["sd"], strict=True)]
-    assert stored["divergence"].tolist() == pytest.approx(due)
-
-
-def test_published_findings_are_recounted(stored: pd.DataFrame) -> None:
-    """What the notebook says of the grid counts the points of the published table."""
-    assert f"But {near(stored).sum()} of the 120 points" in findings(stored)
+    assert stored["kl_divergence"].is_monotonic_increasing
+    expected = [kl_divergence(*row, PAIR) for row in zip(stored["mean"], stored["sd"], strict=True)]
+    assert stored["kl_divergence"].tolist() == pytest.approx(expected)
 
 
 def test_published_check_is_that_of_the_judging_run(stored: pd.DataFrame) -> None:
     """The new trials are those that the claims are judged by, the others those of the grid."""
-    check = read_table(PROJECT / "figures" / "calibration_check.csv")
-    judged = read_table(PROJECT / "figures" / "claims.csv")
+    check = read_table(FIGURES / "calibration" / "check.csv")
+    judged = read_table(FIGURES / "claims" / "verdicts.csv")
     assert check["n"].tolist() == [TRIALS, *[load_claims().judging.trials["open-maze"]] * 2]
     assert check.loc[0, ["mean", "sd"]].tolist() == stored.loc[0, ["mean", "sd"]].tolist()
     names = ["effect", "low", "high", "predicted_low", "predicted_high"]
@@ -267,5 +208,5 @@ def test_published_check_is_that_of_the_judging_run(stored: pd.DataFrame) -> Non
         ("MEAN-UNIFIED-OPEN", ["mean", "low", "high", "predicted_low", "predicted_high"]),
         ("SD-UNIFIED-OPEN", ["sd", "sd_low", "sd_high", "sd_predicted_low", "sd_predicted_high"]),
     ):
-        due = judged[judged["id"] == id][names].to_numpy(float)
-        np.testing.assert_allclose(check.loc[1:, own].to_numpy(float), due, rtol=1e-8)
+        expected = judged[judged["id"] == id][names].to_numpy(float)
+        np.testing.assert_allclose(check.loc[1:, own].to_numpy(float), expected, rtol=1e-8)

@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from replication.evidence.claims import (
+    LABELS,
     TESTS,
     Claim,
     ClaimError,
     canonical_hash,
     criteria_hash,
+    evidence,
+    label,
     load_claims,
     parse_claims,
+    short_label,
 )
 from replication.evidence.experiments import EXPERIMENTS
 from replication.evidence.statistics import CONFIDENCE, FEWEST
@@ -215,7 +220,7 @@ def test_published_numbers_are_those_of_the_paper(claim: Claim) -> None:
 
 def test_published_effects_by_hand() -> None:
     """The published effect is the difference of means, the ratio of SDs, the mean or the SD."""
-    due = {
+    expected = {
         "FASTER": 40.10 - 44.94,
         "STEADIER": 4.73 / 10.27,
         "SAVES-SOCCER": 7 - 15,
@@ -223,7 +228,7 @@ def test_published_effects_by_hand() -> None:
         "SD-ADABOOST-OPEN": 10.27,
         "RUN-UNIFIED-OPEN": 47,
     }
-    for id, effect in due.items():
+    for id, effect in expected.items():
         assert load_claims().by_id(id).paper_effect == pytest.approx(effect)
     assert math.isnan(load_claims().by_id("ZERO-OPEN").paper_effect)
 
@@ -264,8 +269,28 @@ def test_criteria_are_those_of_the_judging_run() -> None:
 
 
 def test_published_verdicts_are_by_this_file() -> None:
-    """The column `criteria` of figures/claims.csv is the hash of the file as it is."""
-    path = PROJECT / "figures" / "claims.csv"
+    """The column `criteria` of the published verdicts is the hash of the file as it is."""
+    path = PROJECT / "figures" / "claims" / "verdicts.csv"
     if not path.exists():
-        pytest.skip("figures/claims.csv is not published yet")
+        pytest.skip("figures/claims is not published yet")
     assert set(read_table(path)["criteria"]) == {criteria_hash()}
+
+
+# --- labels and evidence ---------------------------------------------------------------------
+
+
+def test_labels_are_those_of_claims() -> None:
+    """A label belongs to a claim that compares; a claim without one is called by its id."""
+    assert set(LABELS) <= {claim.id for claim in CLAIMS if claim.direction != "inside"}
+    assert label("FASTER") == LABELS["FASTER"]
+    assert label("NEW-CLAIM") == short_label("NEW-CLAIM") == "NEW-CLAIM"
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=NAMES)
+def test_evidence_is_published(claim: Claim) -> None:
+    """The output that a claim links to is declared by its notebook."""
+    notebook, name = evidence(claim.task, claim.measure).split("/")
+    text = (PROJECT / "notebooks" / f"{notebook}.ipynb").read_text(encoding="utf-8")
+    declared = json.loads(text)["metadata"]["replication"]
+    names = [*declared.get("figures", ()), *declared.get("tables", ())]
+    assert name in [*names, *(Path(file).stem for file in declared.get("data", ()))]

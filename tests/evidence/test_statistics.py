@@ -73,14 +73,14 @@ def test_comparison_by_hand() -> None:
 def test_spread_by_hand() -> None:
     """Brown-Forsythe is the analysis of variance of the distances from the medians."""
     x, y = [1, 2, 3, 4, 9], [0, 10, 20, 35, 50]
-    due = stats.f_oneway([2, 1, 0, 1, 6], [20, 10, 0, 15, 30]).pvalue
-    assert compare(x, y).p_spread == pytest.approx(due)
+    expected = stats.f_oneway([2, 1, 0, 1, 6], [20, 10, 0, 15, 30]).pvalue
+    assert compare(x, y).p_spread == pytest.approx(expected)
 
 
 @given(COUNTS)
 @settings(deadline=None, max_examples=8)
 def test_a_sample_does_not_differ_from_itself(x: list[int]) -> None:
-    """Against itself a condition differs by 0, is fewer in half of the pairs, and no test rejects."""
+    """Against itself a condition differs by 0, is fewer in half the pairs, and no test rejects."""
     found = compare(x, x, published=-4.8)
     assert (found.difference, found.low, found.high, found.fewer) == (0.0, 0.0, 0.0, 0.5)
     assert (found.p_welch, found.p_wilcoxon) == (1.0, 1.0)
@@ -209,9 +209,9 @@ def test_sd_prediction_by_hand() -> None:
     assert sd_prediction(4.73, 100, halves) == pytest.approx((4.73, 4.73))
     sample = np.array([0.0, 1.0, 2.0, 3.0])  # kurtosis 1.64, so that the variance is .64 / 16
     half = 1.959964 * (0.04 * (1 + 4 / 100)) ** 0.5
-    due = 4.73 * np.exp(-half), 4.73 * np.exp(half)
-    assert sd_prediction(4.73, 100, sample) == pytest.approx(due)
-    assert sd_prediction(4.73, 100, 40 + 3 * sample) == pytest.approx(due)
+    expected = 4.73 * np.exp(-half), 4.73 * np.exp(half)
+    assert sd_prediction(4.73, 100, sample) == pytest.approx(expected)
+    assert sd_prediction(4.73, 100, 40 + 3 * sample) == pytest.approx(expected)
     low, high = sd_interval(sample)
     assert low * high == pytest.approx(sample.var(ddof=1))
     assert np.log(high / low) == pytest.approx(2 * 1.959964 * 0.2)
@@ -273,8 +273,8 @@ def test_intervals_of_many_ratios_are_those_of_each() -> None:
     ratio, low, high = sd_ratio_intervals(x, y)
     for at in range(4):
         one = compare(x[at], y[at])
-        due = one.sd_ratio, one.sd_low, one.sd_high
-        assert (ratio[at], low[at], high[at]) == pytest.approx(due, rel=1e-9)
+        expected = one.sd_ratio, one.sd_low, one.sd_high
+        assert (ratio[at], low[at], high[at]) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.1, 40.0, 1 / 3]])

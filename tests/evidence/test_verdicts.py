@@ -10,7 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from replication.evidence.claims import Claim, Claims, Judging, criteria_hash, load_claims
+from replication.evidence.claims import (
+    MEASURES,
+    Claim,
+    ClaimError,
+    Claims,
+    Judging,
+    criteria_hash,
+    load_claims,
+)
 from replication.evidence.statistics import (
     compare,
     holm,
@@ -28,11 +36,12 @@ from replication.evidence.verdicts import (
     by_claim,
     decide,
     judge_claims,
+    judged_trials,
     overall,
 )
+from replication.irl import get_method
 
 N = 40
-MEASURES = ("iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope")
 VERDICTS = [REPRODUCED, REVERSED, UNDECIDED, NOT_REPRODUCED, NOT_TESTABLE]
 RNG = np.random.default_rng(11)
 NOISE = RNG.permutation(np.tile([-3.0, -2.0, -1.0, 0.0, 0.0, 1.0, 2.0, 3.0], N // 8))
@@ -65,11 +74,11 @@ def published(statistic: str, numbers: Sequence[float], **changed: Any) -> Claim
     )
 
 
-def rows(method: str, f: str = "printed", **measured: Any) -> pd.DataFrame:
+def rows(method: str, reading: str = "printed", **measured: Any) -> pd.DataFrame:
     """Make trials of one method up, all converged unless it is said."""
     n = len(np.atleast_1d(np.asarray(next(iter(measured.values())))))
     usual: dict[str, Any] = dict.fromkeys(MEASURES, 1.0)
-    key = {"task": "open-maze", "method": method, "F": f, "trial": np.arange(n)}
+    key = {"task": "open-maze", "method": method, "reading": reading, "trial": np.arange(n)}
     return pd.DataFrame({**key, **usual, **measured})
 
 
@@ -95,43 +104,45 @@ def verdict(measures: pd.DataFrame, claim: Claim) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize(
-    ("shift", "due"), [(-3.0, REPRODUCED), (3.0, REVERSED), (0.0, NOT_REPRODUCED)]
+    ("shift", "expected"), [(-3.0, REPRODUCED), (3.0, REVERSED), (0.0, NOT_REPRODUCED)]
 )
-def test_difference(shift: float, due: str) -> None:
+def test_difference(shift: float, expected: str) -> None:
     """Trials that are clearly fewer, clearly more, or as many."""
     y = 40 + WIDE
-    why = "the interval includes the margin" if due == NOT_REPRODUCED else ""
-    assert verdict(pair(y + NOISE + shift, y), faster()) == (due, why)
+    why = "the interval includes the margin" if expected == NOT_REPRODUCED else ""
+    assert verdict(pair(y + NOISE + shift, y), faster()) == (expected, why)
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "due"),
+    ("x", "y", "expected"),
     [(NOISE, WIDE, REPRODUCED), (WIDE, NOISE, REVERSED), (NOISE, NOISE[::-1], NOT_REPRODUCED)],
 )
-def test_spread(x: NDArray[np.float64], y: NDArray[np.float64], due: str) -> None:
+def test_spread(x: NDArray[np.float64], y: NDArray[np.float64], expected: str) -> None:
     """Trials that scatter clearly less, clearly more, or as much."""
-    assert verdict(pair(40 + x, 40 + y), steadier())[0] == due
+    assert verdict(pair(40 + x, 40 + y), steadier())[0] == expected
 
 
-@pytest.mark.parametrize(("mean", "due"), [(2, REPRODUCED), (-2, REVERSED), (0, NOT_REPRODUCED)])
-def test_mean_against_its_margin(mean: float, due: str) -> None:
+@pytest.mark.parametrize(
+    ("mean", "expected"), [(2, REPRODUCED), (-2, REVERSED), (0, NOT_REPRODUCED)]
+)
+def test_mean_against_its_margin(mean: float, expected: str) -> None:
     """A mean that should be above its margin, whatever the margin is."""
     for margin in (0.0, 7.0):
         claim = faster(
             measure="q_growth", statistic="mean", y="", direction="greater", margin=margin
         )
         table = judge(rows("unified-incorrect", q_growth=NOISE + mean + margin), claim)
-        assert table["verdict"].item() == due
+        assert table["verdict"].item() == expected
         assert table["effect"].item() == pytest.approx(mean + margin)
         assert table["low"].item() < mean + margin < table["high"].item()
         assert np.isnan(table["fewer"].item())
 
 
 @pytest.mark.parametrize(
-    ("done", "margin", "due"),
+    ("done", "margin", "expected"),
     [(40, 0.9, REPRODUCED), (39, 0.9, NOT_REPRODUCED), (20, 0.9, REVERSED), (20, 0.2, REPRODUCED)],
 )
-def test_share(done: int, margin: float, due: str) -> None:
+def test_share(done: int, margin: float, expected: str) -> None:
     """The smaller share is judged by its interval alone, and may have trials at the cap."""
     claim = faster(
         measure="converged", statistic="share", direction="greater", margin=margin, test="none"
@@ -139,7 +150,7 @@ def test_share(done: int, margin: float, due: str) -> None:
     some = (np.arange(N) < done).astype(float)
     for x, y in ((some, np.ones(N)), (np.ones(N), some)):
         row = judge(pair(x, y, "converged"), claim).iloc[0]
-        assert (row["verdict"], row["effect"], row["capped"]) == (due, done / N, N - done)
+        assert (row["verdict"], row["effect"], row["capped"]) == (expected, done / N, N - done)
         assert (row["low"], row["high"]) == share_interval(done, N)
         assert np.isnan(row["p"])
 
@@ -225,17 +236,17 @@ def test_constant_difference_is_judged() -> None:
 def test_used_numbers_get_no_verdict() -> None:
     """A number that made a choice is not judged: under one reading, or under all."""
     measures = pd.concat([rows("unified-incorrect", f, iterations=40 + NOISE) for f in "ab"])
-    measures["F"] = measures["F"].map({"a": "printed", "b": "updated"})
-    for used, due in (
+    measures["reading"] = measures["reading"].map({"a": "printed", "b": "updated"})
+    for used, expected in (
         ({"printed": "why"}, [NOT_TESTABLE, REPRODUCED]),
         ({"updated": "why"}, [REPRODUCED, NOT_TESTABLE]),
         ({"all": "why"}, [NOT_TESTABLE, NOT_TESTABLE]),
         ({}, [REPRODUCED, REPRODUCED]),
     ):
         table = judge(measures, published("published-mean", (40.0, 3.0, 100), used=used))
-        assert table["F"].tolist() == ["printed", "updated"]
-        assert table["verdict"].tolist() == due
-        assert table["why"].tolist() == ["why" if one == NOT_TESTABLE else "" for one in due]
+        assert table["reading"].tolist() == ["printed", "updated"]
+        assert table["verdict"].tolist() == expected
+        assert table["why"].tolist() == ["why" if one == NOT_TESTABLE else "" for one in expected]
         assert table["effect"].notna().all()
 
 
@@ -243,8 +254,8 @@ def test_used_numbers_get_no_verdict() -> None:
 
 
 @pytest.mark.parametrize("side", [0, 1])
-@pytest.mark.parametrize(("off", "due"), [(-1e-6, REPRODUCED), (1e-6, NOT_REPRODUCED)])
-def test_border_of_a_published_mean(side: int, off: float, due: str) -> None:
+@pytest.mark.parametrize(("off", "expected"), [(-1e-6, REPRODUCED), (1e-6, NOT_REPRODUCED)])
+def test_border_of_a_published_mean(side: int, off: float, expected: str) -> None:
     """Our mean is held against where that of a new sample from the paper would lie."""
     borders = mean_prediction(40.0, 5.0, 100, N)
     mean = borders[side] + (off if side else -off)
@@ -252,15 +263,15 @@ def test_border_of_a_published_mean(side: int, off: float, due: str) -> None:
         rows("unified-incorrect", iterations=NOISE + mean),
         published("published-mean", (40.0, 5.0, 100)),
     )
-    assert table["verdict"].item() == due
+    assert table["verdict"].item() == expected
     assert table[["predicted_low", "predicted_high"]].to_numpy()[0] == pytest.approx(borders)
     assert table["effect"].item() == pytest.approx(mean)
     assert np.isnan(table["p"].item())
 
 
 @pytest.mark.parametrize("side", [0, 1])
-@pytest.mark.parametrize(("off", "due"), [(-1e-6, REPRODUCED), (1e-6, NOT_REPRODUCED)])
-def test_border_of_a_published_sd(side: int, off: float, due: str) -> None:
+@pytest.mark.parametrize(("off", "expected"), [(-1e-6, REPRODUCED), (1e-6, NOT_REPRODUCED)])
+def test_border_of_a_published_sd(side: int, off: float, expected: str) -> None:
     """Our SD is held against where that of a new sample from the paper would lie."""
     borders = sd_prediction(5.0, 100, NOISE)  # depends on the kurtosis, not on the scale
     sd = borders[side] * (1 + (off if side else -off))
@@ -269,26 +280,43 @@ def test_border_of_a_published_sd(side: int, off: float, due: str) -> None:
         rows("unified-incorrect", iterations=sample),
         published("published-sd", (40.0, 5.0, 100)),
     )
-    assert table["verdict"].item() == due
+    assert table["verdict"].item() == expected
     assert table[["predicted_low", "predicted_high"]].to_numpy()[0] == pytest.approx(borders)
     assert table["effect"].item() == pytest.approx(sd)
     assert table["low"].item() < sd < table["high"].item()
 
 
 @pytest.mark.parametrize(
-    ("run", "due"), [(37, REPRODUCED), (43, REPRODUCED), (36, NOT_REPRODUCED), (44, NOT_REPRODUCED)]
+    ("run", "expected"),
+    [(37, REPRODUCED), (43, REPRODUCED), (36, NOT_REPRODUCED), (44, NOT_REPRODUCED)],
 )
-def test_border_of_a_published_run(run: float, due: str) -> None:
+def test_border_of_a_published_run(run: float, expected: str) -> None:
     """A single run of the paper's should lie in the central 95 % of our trials."""
     table = judge(
         rows("unified-incorrect", iterations=40 + NOISE), published("published-run", (run, 0.0, 1))
     )
     assert (table["low"].item(), table["high"].item()) == (37.0, 43.0)
-    assert (table["verdict"].item(), table["paper"].item()) == (due, run)
+    assert (table["verdict"].item(), table["paper"].item()) == (expected, run)
     assert table["effect"].item() == 40.0
 
 
 # --- the table -------------------------------------------------------------------------------
+
+
+def test_main_conditions_are_judged() -> None:
+    """Of tables of trials only the default sets count, and as many trials as are declared."""
+    judging = load_claims().judging
+    default = {"open-maze": "hit+detour", "obstacle-maze": "hit+detour", "soccer": "all"}
+    parts = [
+        rows(method, iterations=np.ones(n + 5)).assign(task=task, set=kinds)
+        for task, n in judging.trials.items()
+        for method, sets in (("unified", ["none"]), ("unified-incorrect", ["hit", default[task]]))
+        for kinds in sets
+    ]
+    trials = judged_trials(pd.concat(parts), judging)
+    for (task, method), part in trials.groupby(["task", "method"]):
+        assert part["trial"].tolist() == list(range(judging.trials[task]))
+        assert set(part["set"]) == {"none" if method == "unified" else default[str(task)]}
 
 
 @pytest.fixture(scope="module")
@@ -299,11 +327,11 @@ def whole() -> pd.DataFrame:
     means = {"adaboost": 45, "unified": 40, "unified-incorrect": 36}
     for task, n in load_claims().judging.trials.items():
         for method, mean in means.items():
-            for f in ("",) if method == "adaboost" else ("printed", "updated"):
+            for reading in get_method(method).readings:
                 measured: dict[str, Any] = {name: rng.normal(0.5, 1.0, n) for name in MEASURES}
                 measured["iterations"] = mean + rng.integers(-6, 7, n)
                 measured["converged"] = np.ones(n)
-                parts.append(rows(method, f, **measured).assign(task=task))
+                parts.append(rows(method, reading, **measured).assign(task=task))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -315,12 +343,10 @@ def judged(whole: pd.DataFrame) -> pd.DataFrame:
 
 def test_every_claim_has_a_row_for_each_reading(judged: pd.DataFrame) -> None:
     """Rows stand in the order of the file; a method without a trace has one."""
-    due = [
-        (one.id, f)
-        for one in load_claims().claim
-        for f in (("",) if one.x == "adaboost" else ("printed", "updated"))
+    expected = [
+        (one.id, reading) for one in load_claims().claim for reading in get_method(one.x).readings
     ]
-    assert list(judged[["id", "F"]].itertuples(index=False, name=None)) == due
+    assert list(judged[["id", "reading"]].itertuples(index=False, name=None)) == expected
     assert [id for id, _ in by_claim(judged)] == [one.id for one in load_claims().claim]
     assert set(judged["verdict"]) <= set(VERDICTS)
     assert set(judged["criteria"]) == {criteria_hash()}
@@ -343,16 +369,16 @@ def test_effects_are_those_of_the_comparison(judged: pd.DataFrame, whole: pd.Dat
     for row in compared.itertuples():
         own = whole[whole["task"] == row.task]
         x, y = (
-            own[(own["method"] == name) & own["F"].isin([row.F, ""])][row.measure]
+            own[(own["method"] == name) & own["reading"].isin([row.reading, ""])][row.measure]
             for name in (row.x, row.y)
         )
         found = compare(x, y, published=row.paper)
         if row.statistic == "sd-ratio":
-            due = found.sd_ratio, found.sd_low, found.sd_high, found.p_spread
+            expected = found.sd_ratio, found.sd_low, found.sd_high, found.p_spread
         else:
-            due = found.difference, found.low, found.high, found.p_wilcoxon
+            expected = found.difference, found.low, found.high, found.p_wilcoxon
             assert (row.fewer, row.power) == pytest.approx((found.fewer, found.power), nan_ok=True)
-        assert (row.effect, row.low, row.high, row.p) == due
+        assert (row.effect, row.low, row.high, row.p) == expected
 
 
 def test_order_of_the_rows_changes_nothing(judged: pd.DataFrame, whole: pd.DataFrame) -> None:
@@ -405,10 +431,12 @@ def test_method_without_a_trace_stands_beside_both_readings() -> None:
 
 
 def test_missing_trials_are_an_error() -> None:
-    """A claim whose second method was not run cannot be judged."""
-    with pytest.raises(KeyError, match="no trials of unified on open-maze"):
+    """A claim whose methods were not run cannot be judged: one line names the notebook to run."""
+    with pytest.raises(ClaimError, match=r"open-maze: run the notebook open_maze first$"):
+        judge(rows("unified", iterations=40 + NOISE).assign(task="soccer"), faster())
+    with pytest.raises(ClaimError, match="no trials of unified on open-maze"):
         judge(rows("unified-incorrect", iterations=40 + NOISE), faster())
-    with pytest.raises(KeyError, match="no trials of unified-incorrect on open-maze"):
+    with pytest.raises(ClaimError, match="no trials of unified-incorrect on open-maze"):
         judge(rows("unified", iterations=40 + NOISE), faster())
 
 

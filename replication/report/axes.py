@@ -1,0 +1,178 @@
+"""What the figures of claims share: scales, marks, rows in blocks, legends, counts in words."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import Locator, MaxNLocator, NullFormatter, NullLocator
+from numpy.typing import NDArray
+
+from replication.evidence.sensitivity import HOLDS, OPEN, REVERSED
+from replication.report.readable import F_LABELS
+
+OUTCOMES = {HOLDS: "#0072B2", OPEN: "#9A9A9A", REVERSED: "#D55E00"}
+MARKS = {HOLDS: "o", OPEN: "s", REVERSED: "D"}
+READING_MARKS = {"printed": ("o", "#222222"), "updated": ("s", "#009E73"), "": ("o", "#222222")}
+SMALL = 6.8
+
+FAR = 8
+"""How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""
+
+UNITS = {
+    ("mean-difference", "iterations"): "difference in iterations",
+    ("mean-difference", "early_errors"): "difference in erroneous motions",
+    ("sd-ratio", "iterations"): "ratio of SDs",
+    ("mean", "q_growth"): "growth of Q",
+    ("mean", "q_slope"): "rank correlation",
+    ("mean", "reward_slope"): "rank correlation",
+    ("share", "converged"): "share of trials at zero",
+}
+"""The unit of a comparative claim's effect, by its statistic and its measure."""
+
+
+def number(value: float) -> str:
+    """Return a number with three digits and a proper minus."""
+    return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+
+
+# --- scales --------------------------------------------------------------------------------------
+
+
+class Ratios(Locator):
+    """Ticks of a logarithmic axis that are apart by at least a share of its length."""
+
+    def __init__(self, apart: float) -> None:
+        self.apart = apart
+
+    def __call__(self) -> list[float]:
+        """Return the ticks in view."""
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+        for steps in ([1, 1.5, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]):
+            ticks = [tick for tick in np.outer(decades, steps).ravel() if low <= tick <= high]
+            gaps = np.diff(np.log(ticks)) / np.log(high / low)
+            if (gaps >= self.apart).all():
+                break
+        return ticks
+
+
+def scale(panel: Axes, name: str, statistic: str, effects: pd.Series) -> None:
+    """Give an axis few ticks, ratios a logarithmic one, and far outliers one that they fit on."""
+    size = effects.abs().dropna()
+    axis: Any = getattr(panel, f"{name}axis")
+    if statistic == "sd-ratio":
+        getattr(panel, f"set_{name}scale")("log")
+        axis.set_major_locator(Ratios(0.2 if name == "x" else 0.06))
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(NullFormatter())
+        axis.set_minor_locator(NullLocator())
+    elif size.max() > FAR * size.quantile(0.75) > 0:
+        linear = 10.0 ** np.ceil(np.log10(size.quantile(0.75)))
+        getattr(panel, f"set_{name}scale")("symlog", linthresh=linear)
+        axis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}"))
+        axis.set_minor_locator(NullLocator())
+    else:
+        axis.set_major_locator(MaxNLocator(4 if name == "x" else 6, steps=[1, 2, 2.5, 5, 10]))
+
+
+def unit(panel: Axes, name: str, statistic: str, measure: str) -> tuple[str, str]:
+    """Return the unit of an axis, and what to add if its scale is symmetric logarithmic."""
+    symmetric = getattr(panel, f"get_{name}scale")() == "symlog"
+    return UNITS[statistic, measure], ", symmetric log axis" if symmetric else ""
+
+
+def pad(figure: Figure, **pads: float) -> None:
+    """Set the paddings of a figure's layout."""
+    engine: Any = figure.get_layout_engine()
+    engine.set(**pads)
+
+
+# --- rows ----------------------------------------------------------------------------------------
+
+
+def blocks(ids: Sequence[Hashable]) -> NDArray[np.float64]:
+    """Return where rows lie, with a gap wherever the id changes."""
+    changes = [0.0, *(float(a != b) for a, b in zip(ids[1:], ids[:-1], strict=True))]
+    return np.arange(len(ids)) + 0.45 * np.cumsum(changes)
+
+
+def beside(panel: Axes, text: str, x: float, y: float, points: float, **style: Any) -> None:
+    """Write beside a row: so many points right of an end of the panel, x = 0 or 1."""
+    panel.annotate(
+        text,
+        (x, y),
+        (points, 0),
+        xycoords=panel.get_yaxis_transform(),
+        textcoords="offset points",
+        va="center_baseline",
+        size=SMALL,
+        **style,
+    )
+
+
+def label_blocks(
+    panel: Axes,
+    rows: Sequence[tuple[str, str]],
+    y: NDArray[np.float64],
+    *,
+    defaults: Mapping[str, str],
+    labelled: bool = True,
+) -> None:
+    """Shade every other block of rows; name it and its values at the left, defaults in bold."""
+    ids = [id for id, _ in rows]
+    for count, id in enumerate(dict.fromkeys(ids)):
+        places = y[[other == id for other in ids]]
+        if count % 2 == 0:
+            panel.axhspan(places[0] - 0.72, places[-1] + 0.72, color="0.96", lw=0, zorder=-1)
+        if labelled:
+            beside(panel, id, 0, places[0], -158)
+            for at, (_, value) in zip(places, (row for row in rows if row[0] == id), strict=True):
+                weight = "bold" if defaults.get(id) == value else "normal"
+                beside(panel, value, 0, at, -4, ha="right", weight=weight)
+    panel.set_ylim(y[-1] + 0.8, -0.8)
+
+
+# --- legends -------------------------------------------------------------------------------------
+
+
+def handle(label: str, mark: str, colour: Any, **style: Any) -> Artist:
+    """Return an entry of a legend: a mark on a line."""
+    return Line2D([], [], label=label, marker=mark, color=colour, **{"ms": 4, **style})
+
+
+def outcome_handles(mark: str, margin: str, *, capped: bool) -> list[Artist]:
+    """Return the legend's entries for outcomes; without a mark each outcome has its own."""
+    handles = [handle(name, mark or MARKS[name], colour) for name, colour in OUTCOMES.items()]
+    if capped:
+        handles.append(handle("hollow: trials at the cap", mark or "o", "0.4", mfc="white", lw=0))
+    return [*handles, handle(margin, "", "0.25", lw=1)]
+
+
+def reading_handles(numbers: pd.DataFrame) -> list[Artist]:
+    """Return the legend's entries for the readings of Eq. 9 that a table has."""
+    used = set(numbers["reading"])
+    return [handle(F_LABELS[name], *READING_MARKS[name]) for name in READING_MARKS if name in used]
+
+
+# --- counts in words -----------------------------------------------------------------------------
+
+
+def holding(part: pd.DataFrame) -> str:
+    """Say in how many specifications a claim holds."""
+    holds = int((part["outcome"] == HOLDS).sum())
+    return f"{holds} of {len(part)} specifications ({100 * holds / len(part):.0f} %)"
+
+
+def counted(part: pd.DataFrame) -> str:
+    """Say in how many specifications a claim is open, and in how many reversed."""
+    return ", ".join(
+        f"{name} in {int((part['outcome'] == name).sum())}" for name in (OPEN, REVERSED)
+    )
