@@ -11,6 +11,10 @@ from typing import Any
 class UserError(ValueError):
     """A mistake in what the package was given; the message is one line for the user."""
 
+    def _render_traceback_(self) -> list[str]:
+        """Show one line in a notebook instead of a traceback; IPython asks for it by this name."""
+        return [f"error: {self}"]
+
 
 def unknown(name: str, known: Iterable[str], what: str) -> str:
     """Return the message about a misspelt `name`, with the nearest of the `known` ones first.

@@ -110,3 +110,18 @@ def set_conditions(
             params = Params.of(**{**choices, **chosen}, f_index=f)
             found[kinds, f] = Condition(demos, method, params)
     return found
+
+
+def condition_of(task: str, method: str, reading: str, set: str) -> Condition:
+    """Return the condition of a row of a table of trials.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If there is no such task, or it has no such condition.
+    """
+    experiment = EXPERIMENTS[task]
+    values = {**experiment.choices, **({"f_index": reading} if reading else {})}
+    if set != "none":
+        values["incorrect"] = set
+    return Condition(load_demos(resolve(experiment.demos)), method, Params.of(**values))
