@@ -120,8 +120,9 @@ def test_tables_are_shown_by_their_names(project: Path) -> None:
         cells = [
             new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
             new_code_cell(
-                "from pathlib import Path\nfor name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
-                f"    (Path(out) / name).write_text(f'| {name} |\\n')"
+                "from pathlib import Path\n"
+                "for name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
+                f"    (Path(out) / name).write_text('| {name} |\\n')"
             ),
         ]
         node = new_notebook(cells=cells, metadata={"replication": {"tables": ["main", "sets"]}})

@@ -16,6 +16,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
+from replication import source
 from replication.errors import UserError
 from replication.files import write_file
 from replication.pipeline import publish
@@ -23,7 +24,6 @@ from replication.pipeline.manifest import RUNS
 from replication.pipeline.notebook import NotebookError, RunError
 from replication.pipeline.run import Published, run_notebooks
 from replication.pipeline.verify import verify_outputs
-from replication import source
 
 STORED = 'trials = 3\nalpha = 0.5\nseed = 1\njobs = 1\nstore = "build/trials.sqlite"\nout = "x"'
 WRITE = "[(folder / f'{name}.txt').write_text(f'{value}') for name in 'ab']"
