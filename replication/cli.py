@@ -38,12 +38,19 @@ GRACE = 5.0
 class OneLineErrors(click.Group):
     """Reports a user's mistake in one line; a fault of the program keeps its traceback."""
 
-    def main(self, *args: Any, **extra: Any) -> Any:
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
         """Run the command, and end with its exit code unless told otherwise."""
-        if not extra.pop("standalone_mode", True):
-            return super().main(*args, **extra, standalone_mode=False)
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, False, **extra)
         try:
-            code = super().main(*args, **extra, standalone_mode=False)
+            code = super().main(args, prog_name, complete_var, False, **extra)
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.message)
             sys.exit(2)
@@ -97,19 +104,30 @@ parameters_option = click.option(
     metavar="NAME VALUE",
     help="Set a parameter; VALUE is JSON, or else text. May be repeated.",
 )
-out_option = click.option("--out", type=FILE, metavar="FOLDER", help="The outputs.")
-jobs_option = click.option(
-    "--jobs",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Worker processes; one for each usable core by default.",
-)
+
+
+def number(name: str, least: int | None, text: str, **more: Any) -> Callable[..., Any]:
+    """Return an option that takes a whole number, not below the least one."""
+    kind = click.INT if least is None else click.IntRange(least)
+    return click.option(name, type=kind, help=text, **{"metavar": "N"} | more)
+
+
+def folder(text: str, default: Path | None = None) -> Callable[..., Any]:
+    """Return the option --out."""
+    shown = default is not None
+    return click.option(
+        "--out", type=FILE, default=default, show_default=shown, metavar="FOLDER", help=text
+    )
 
 
 def profile_option(text: str = "The profile that the outputs belong to.") -> Callable[..., Any]:
-    """Return the option --profile with a help text."""
+    """Return the option --profile."""
     names = click.Choice(["quick", "paper"])
     return click.option("--profile", type=names, default="paper", show_default=True, help=text)
+
+
+out_option = folder("The outputs.")
+jobs_option = number("--jobs", 1, "Worker processes; one for each usable core by default.")
 
 
 @click.group(
@@ -136,17 +154,13 @@ def demos_group() -> None:
 @click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
 @profile_option("The paper's number of trials, or a few.")
 @jobs_option
-@click.option(
-    "--seed", type=click.IntRange(0), metavar="N", help="Root seed; the notebook's by default."
-)
-@click.option("--out", type=FILE, metavar="FOLDER", help="Where the outputs go.")
-@click.option(
-    "--timeout",
-    type=click.IntRange(1),
+@number("--seed", 0, "Root seed; the notebook's by default.")
+@folder("Where the outputs go.")
+@number(
+    *("--timeout", 1, "Time that one cell may take."),
     default=3600,
     show_default=True,
     metavar="SECONDS",
-    help="Time that one cell may take.",
 )
 @click.option("--force", is_flag=True, help="Re-run everything, and recompute every trial.")
 @click.option(
@@ -339,14 +353,7 @@ def clean(profile: str, out: Path | None, dry_run: bool) -> None:
 
 
 @app.command(epilog="Example: replicate site")
-@click.option(
-    "--out",
-    type=FILE,
-    default=Path("build/site"),
-    show_default=True,
-    metavar="FOLDER",
-    help="Where the site goes.",
-)
+@folder("Where the site goes.", Path("build/site"))
 def site(out: Path) -> None:
     """Build the report from the published results; nothing is executed."""
     from replication.site.build import build_site
@@ -367,28 +374,16 @@ def site(out: Path) -> None:
     metavar="METHOD",
     help="adaboost, unified or unified-incorrect.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, metavar="N", help="Root seed.")
+@number("--seed", 0, "Root seed.", default=0)
 @click.option(
     "--incorrect",
     metavar="SET",
     help="Incorrect demos: all (the default), none, or kinds joined by +.",
 )
 @parameters_option
-@click.option(
-    "--out",
-    type=FILE,
-    default=Path("build/learn"),
-    show_default=True,
-    metavar="FOLDER",
-    help="Where the result goes.",
-)
+@folder("Where the result goes.", Path("build/learn"))
 def learn(
-    file: Path,
-    method: str,
-    seed: int,
-    incorrect: str | None,
-    parameters: dict[str, Any],
-    out: Path,
+    file: Path, method: str, seed: int, incorrect: str | None, parameters: dict[str, Any], out: Path
 ) -> None:
     """Learn a reward from the demonstrations of a file.
 
@@ -429,13 +424,8 @@ def learn(
 @click.option(
     "--out", required=True, type=FILE, metavar="FILE", help="The demonstration file to write."
 )
-@click.option("--leg", type=int, metavar="N", help="Cells of a straight leg (choice DEMO-SHAPE).")
-@click.option(
-    "--detour-width",
-    type=int,
-    metavar="N",
-    help="Cells that a detour keeps off (choice DETOUR-WIDTH).",
-)
+@number("--leg", None, "Cells of a straight leg (choice DEMO-SHAPE).")
+@number("--detour-width", None, "Cells that a detour keeps off (choice DETOUR-WIDTH).")
 def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     """Let the scripted expert demonstrate in a maze of your own.
 

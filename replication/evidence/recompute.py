@@ -25,11 +25,7 @@ COLUMNS = (
 
 
 def recompute_trials(
-    out: Path,
-    store: Path,
-    *,
-    jobs: int = 1,
-    report: Callable[[int], object] = lambda _: None,
+    out: Path, store: Path, *, jobs: int = 1, report: Callable[[int], object] = lambda _: None
 ) -> Iterator[str]:
     """Recompute every 20th trial of each table of trials, and yield what differs.
 

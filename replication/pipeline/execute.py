@@ -113,12 +113,14 @@ def _environment(scratch: Path, scheduler: str) -> dict[str, str]:
         "language": "python",
     }
     write_file(scratch / "jupyter" / "kernels" / KERNEL / "kernel.json", json.dumps(spec))
+    (scratch / "tmp").mkdir()
     path = (str(scratch / "jupyter"), os.environ.get("JUPYTER_PATH"))
     return {
         **os.environ,
         "JUPYTER_PATH": os.pathsep.join(filter(None, path)),
         "JUPYTER_RUNTIME_DIR": str(scratch / "runtime"),
         "IPYTHONDIR": str(scratch / "ipython"),
+        "TMPDIR": str(scratch / "tmp"),  # what a killed kernel leaves goes with the folder
         "PYTHONSTARTUP": "",
         "PYTHONHASHSEED": "0",  # sets keep their order from run to run
         EVENTS: str(scratch / "events"),

@@ -12,13 +12,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from replication import files
+from replication.errors import UserError
 from replication.evidence.tables import read_table
 from replication.files import write_file
-from replication.pipeline import provenance
-from replication.pipeline.folders import exclusive, executed_folder, outputs_folder
-from replication.pipeline.freshness import FRESH, PROSE, read_runs, state_of
+from replication.pipeline.folders import exclusive, outputs_folder
+from replication.pipeline.manifest import FRESH, read_manifest, read_runs
+from replication.pipeline.notebook import EXECUTED
 from replication.pipeline.plan import Run, prepare
-from replication.pipeline.run import refresh_text
+from replication.pipeline.run import render_text
 from replication.site import overview
 from replication.site.pages import Provenance, anchor, page
 
@@ -30,7 +31,7 @@ INDEX = "searchindex.js"
 """A file that Sphinx writes into every site, and nothing else writes."""
 
 
-class SiteError(ValueError):
+class SiteError(UserError):
     """Something that the site is built from is missing or stale; the message is one line."""
 
 
@@ -64,28 +65,25 @@ def build_site(
     if site.exists() and any(site.iterdir()) and not (site / INDEX).exists():
         raise SiteError(f"{site} holds other files than a site; choose another folder")
     out = outputs_folder("paper")
-    folder = executed_folder(out, "paper")
     work = files.PROJECT / "build" / "site-work"
-    with exclusive((out, work), echo):
-        runs = prepare(notebooks, profile="paper")
-        _check(runs, out, folder)
-        _stage(dict(_sources(runs, out, folder)), work)
+    with exclusive(out, echo), exclusive(work, echo):
+        runs = prepare(notebooks, profile="paper", out=out)
+        _check(runs)
+        _stage(dict(_sources(runs, out)), work)
         echo(f"writing {len(runs)} notebooks and the pages of docs")
         _write(work)
         _replace(work / "html", site)
     return site / "index.html"
 
 
-def _check(runs: Sequence[Run], out: Path, folder: Path) -> None:
+def _check(runs: Sequence[Run]) -> None:
     """Refuse what is not fresh; take over text that changed."""
     for run in runs:
-        state = state_of(run, out, folder)
-        if state.kind == PROSE:
-            refresh_text(run.notebook, out, folder)
-        elif state.kind != FRESH:
-            name = run.notebook.name
+        state = run.state
+        if state.kind != FRESH:
             why = f": {state.why[0]}" if state.why else ""
-            raise SiteError(f"{name} is {state.kind}{why}; first: replicate run {name}")
+            raise SiteError(f"{run.name} is {state.kind}{why}; first: replicate run {run.name}")
+        render_text(run)
 
 
 def _stage(staged: Mapping[str, bytes], work: Path) -> None:
@@ -105,7 +103,7 @@ def _stage(staged: Mapping[str, bytes], work: Path) -> None:
             write_file(target, content)
 
 
-def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str, bytes]]:
+def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     docs = files.PROJECT / "docs"
     for path in sorted(docs.rglob("*.md")):
         yield path.relative_to(docs).as_posix(), path.read_bytes()
@@ -113,20 +111,20 @@ def _sources(runs: Sequence[Run], out: Path, folder: Path) -> Iterator[tuple[str
         for path in sorted(files.PROJECT.glob(pattern)):
             yield path.relative_to(files.PROJECT).as_posix(), path.read_bytes()
     yield "_generated/readme.md", _readme().encode()
-    for path in sorted(out.glob("[!.]*")):
+    for path in sorted(out.glob("*/[!.]*")):
         if path.suffix != ".ipynb":
-            yield f"figures/{path.name}", path.read_bytes()
-    manifest, remembered = provenance.read_manifest(out), read_runs(folder)
+            yield f"figures/{path.relative_to(out).as_posix()}", path.read_bytes()
+    recorded = read_runs(out)
     for run in runs:
-        name = run.notebook.name
-        done = remembered.get(name, {})
+        name = run.name
+        done = recorded.get(name, {})
         came = Provenance(
             name,
-            manifest[name]["inputs"]["parameters"],
+            read_manifest(run.folder)["inputs"]["parameters"],
             done.get("seconds"),
             done.get("machine", ""),
         )
-        shown = page(out / run.notebook.executed, out, came)
+        shown = page(run.folder / EXECUTED, run.folder, came)
         yield f"notebooks/{name}.ipynb", json.dumps(shown, indent=1).encode()
         yield f"source/{name}.ipynb", run.notebook.path.read_bytes()
     for name, text in _overview(out).items():

@@ -53,7 +53,7 @@ def test_a_full_disk_leaves_the_old_output(checkout: Checkout, trials: int) -> N
 
 
 def test_every_write_may_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whichever write finds the disk full: one error line, whole files, and a later run puts it right."""
+    """Whichever write finds the disk full: one error line, whole files, a later run is whole."""
     notebook(tmp_path / "notebooks" / "toy.ipynb", "1", data=["a.txt"], parameters='out = "x"')
     monkeypatch.setattr(files, "PROJECT", tmp_path)
     content = {"text": "old"}

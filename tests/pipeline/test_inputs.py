@@ -70,7 +70,8 @@ def test_prose_comments_and_layout_do_not_count(write: Write, project: Path) -> 
     """A reader's text, and how code and data are laid out, leave the inputs as they are."""
     before = inputs_of(write(), {})
     notebook = write(
-        '"""Why."""\nfrom replication.learning.seeds import trial_seeds  # the seeds\n\nvalue = (trials)',
+        '"""Why."""\n'
+        "from replication.learning.seeds import trial_seeds  # the seeds\n\nvalue = (trials)",
         prose="# Another headline",
         parameters=f"# So many:\n{PARAMETERS}  # a folder",
     )

@@ -26,7 +26,7 @@ def marked(mark: Path) -> list[int]:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes()
-            own = f"TMPDIR={mark}".encode() in (folder / "environ").read_bytes().split(b"\0")
+            own = f"TMPDIR={mark}".encode() in (folder / "environ").read_bytes()
         except OSError:
             continue
         if own and (b"ipykernel_launcher" in words or b"pipeline.driver" in words):

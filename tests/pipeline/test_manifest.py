@@ -8,7 +8,6 @@ import pytest
 
 from replication.pipeline import manifest
 from replication.pipeline.manifest import (
-    MANIFEST,
     damaged,
     output_hash,
     published_folders,
@@ -16,6 +15,7 @@ from replication.pipeline.manifest import (
     state_of,
     write_manifest,
 )
+from replication.pipeline.notebook import MANIFEST
 
 INPUTS: dict[str, Any] = {
     "cells": "0",

@@ -112,6 +112,6 @@ def test_a_figure_that_cannot_be_drawn_is_named(out: Path) -> None:
     """Whatever the drawing code raises is one line, and nothing is changed."""
     before = content(out)
     with pytest.raises(NotebookError, match=r"a\.csv: code\.of cannot draw it: KeyError: 'x'"):
-        redraw(out, ["a"], draw=lambda code, table: {}["x"], echo=lambda _: None)
+        redraw(out, ["a"], draw=lambda code, table: {"y": {}}["x"], echo=lambda _: None)
     assert content(out) == before
     assert json.loads((out / "na" / "provenance.json").read_text())["version"] == 2

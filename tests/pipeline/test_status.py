@@ -13,8 +13,8 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import status
-from replication.pipeline.manifest import MANIFEST, RUNS
-from replication.pipeline.notebook import NotebookError
+from replication.pipeline.manifest import RUNS
+from replication.pipeline.notebook import MANIFEST, NotebookError
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import run_notebooks
 from replication.pipeline.status import clean, status_lines
