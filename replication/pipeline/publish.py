@@ -44,8 +44,8 @@ def swap(draft: Path, target: Path) -> None:
         target.rename(aside)
     try:
         draft.rename(target)
-    except OSError:
-        if aside.exists():
+    except BaseException:
+        if aside.exists() and not target.exists():
             aside.rename(target)
         raise
     shutil.rmtree(aside, ignore_errors=True)
