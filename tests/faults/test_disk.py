@@ -30,7 +30,6 @@ if trials in (2, 3):
     parents = psutil.Process().parents()  # the driver, and the run itself
     pid = parents[0 if trials == 3 else 1].pid
     resource.prlimit(pid, resource.RLIMIT_FSIZE, (100_000, 100_000))
-if trials == 3:
     print("much\\n" * 50_000)
 """
 
