@@ -131,6 +131,7 @@ jobs_option = number("--jobs", 1, "Worker processes; one for each usable core by
 
 
 @click.group(
+    "replicate",
     cls=OneLineErrors,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Inverse reinforcement learning from correct and incorrect demonstrations, replicated.",
@@ -190,8 +191,6 @@ def run(
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
     and store) to build/custom.
     """
-    from replication.evidence.claims import load_claims
-    from replication.evidence.specifications import check_declared
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.notebook import RunError
     from replication.pipeline.plan import run_name
@@ -200,10 +199,6 @@ def run(
     _catch_signals()
     paths = [_notebook(name) for name in notebooks] or _all_notebooks()
     target = out or outputs_folder(run_name(profile, seed=seed, parameters=parameters))
-    checks: dict[str, Callable[[], object]] = {
-        "replication/evidence/claims.toml": load_claims,
-        "replication/evidence/specifications.toml": check_declared,
-    }
     try:
         published = run_notebooks(
             list(dict.fromkeys(paths)),
@@ -212,7 +207,7 @@ def run(
             seed=seed,
             parameters=parameters,
             force=force,
-            checks=checks,
+            checks=CHECKS,
             echo=click.echo,
             **options,
         )
@@ -240,6 +235,25 @@ def run(
     changed = [_short(file) for notebook in published for file in notebook.changed]
     if check and changed:
         _end(f"other bytes than published before: {', '.join(changed)}", 1)
+
+
+def _check_claims() -> None:
+    from replication.evidence.claims import load_claims
+
+    load_claims()
+
+
+def _check_specifications() -> None:
+    from replication.evidence.specifications import check_declared
+
+    check_declared()
+
+
+CHECKS: dict[str, Callable[[], object]] = {
+    "replication/evidence/claims.toml": _check_claims,
+    "replication/evidence/specifications.toml": _check_specifications,
+}
+"""What is checked before a notebook runs that reads one of these files."""
 
 
 def _example(message: str, parameters: Mapping[str, Any]) -> str:
@@ -400,7 +414,7 @@ def learn(
     if incorrect not in (None, "none") and not uses_incorrect:
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
     if "incorrect" in parameters:
-        raise UserError("-p incorrect is not taken here; choose the incorrect demos by --incorrect")
+        raise UserError("-p incorrect is not taken here; choose the demos with --incorrect SET")
     params = Params.of(incorrect="all", **parameters)
     with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")

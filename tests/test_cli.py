@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pandas as pd
@@ -25,6 +26,7 @@ from replication.demos.maze_expert import Expert
 from replication.demos.model import Demos
 from replication.demos.schema import json_schema
 from replication.errors import UserError
+from replication.evidence import claims, specifications
 from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.pipeline import run
@@ -315,10 +317,44 @@ def test_check_answers_by_its_exit_code(project: Path) -> None:
     path.write_text(path.read_text().replace("| {trials}", "| so {trials}"))
     result = replicate("run", "--check")
     assert result.exit_code == 1
-    seen = project / "figures" / "toy" / "seen.md"
-    assert result.stderr == f"error: other bytes than published before: {seen}\n"
-    assert seen.read_text().startswith("| so ")
+    folder = project / "figures" / "toy"
+    names = f"{folder / 'notebook.ipynb'}, {folder / 'seen.md'}"  # the cell shows how long it is
+    assert result.stderr == f"error: other bytes than published before: {names}\n"
+    assert (folder / "seen.md").read_text().startswith("| so ")
     assert replicate("run", "--check").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("module", "old", "new", "message"),
+    [
+        (claims, 'statistic = "sd-ratio"', 'statistic = "sd-rato"', "claim STEADIER.statistic"),
+        (claims, "soccer = 60", "soccer = 0", "judging.trials.soccer: Input should be greater"),
+        (specifications, "trials = 10", "trials = 0", "mazes.factorial.trials: Input should be"),
+        (specifications, '["hit", "detour", "op', '["lob", "detour", "op', "soccer.single: "),
+        (specifications, '"far-detour", "opposite"', '"overspeed"', "mazes.single: task open-maze"),
+    ],
+)
+def test_bad_plans_are_refused_before_any_notebook_runs(
+    monkeypatch: pytest.MonkeyPatch, module: Any, old: str, new: str, message: str
+) -> None:
+    """A mistake in the claims or specifications is found by the check of the file."""
+    name = module.__name__.rpartition(".")[2]
+    text = module._text()
+    assert old in text
+    monkeypatch.setattr(module, "_text", lambda: text.replace(old, new, 1))
+    cached = claims.load_claims if module is claims else specifications.load_specifications
+    cached.cache_clear()
+    try:
+        with pytest.raises(UserError, match=f"^{name}.toml, {message}"):
+            cli.CHECKS[f"replication/evidence/{name}.toml"]()
+    finally:
+        cached.cache_clear()
+
+
+def test_every_check_is_of_a_file() -> None:
+    """The files that are checked are there, and are inputs of notebooks."""
+    for name in cli.CHECKS:
+        assert (files.PROJECT / name).exists()
 
 
 def test_missing_kind_comes_with_a_way_out(project: Path, demo_file: Path) -> None:
