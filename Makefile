@@ -10,19 +10,20 @@ unexport PYTHONPATH PYTHONHOME
 # Nor may a local store of packages decide which versions and files the lock names.
 unexport UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
-.PHONY: help reproduce sensitivity site quick test bench lint readme lock clean
+.PHONY: help reproduce sensitivity site quick draw test test-all bench lint readme lock clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-13s%s\n", $$1, $$2 }' Makefile
 	@echo 'The first target builds $(VENV) from environment.lock; PYTHON=python3.12 names its interpreter.'
 
+# The exit code is 1 if bytes differ from those that are published; the site is built all the same.
 reproduce: $(VENV)/.ready ## run everything in the paper, judge each claim, build the site
-	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile paper --here
-	$(VENV)/bin/replicate site
+	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --here --check; status=$$?; \
+	    $(VENV)/bin/replicate site && exit $$status
 
 sensitivity: $(VENV)/.ready ## what the verdicts depend on: the claims under hundreds of other choices
-	$(VENV)/bin/replicate run calibration sensitivity --profile paper --here
+	$(VENV)/bin/replicate run calibration sensitivity --here --check
 
 site: $(VENV)/.ready ## build the report from what is published in figures/, into build/site
 	$(VENV)/bin/replicate site
@@ -33,6 +34,9 @@ quick: $(VENV)/.ready ## the paper with few trials, into build/quick
 test: $(VENV)/.ready ## run the tests
 	$(RUN) -m pytest
 
+test-all: $(VENV)/.ready ## run also those that take minutes: a hundred kills, ten thousand files
+	$(RUN) -m pytest -m "long or not long"
+
 bench: $(VENV)/.ready ## measure speed
 	$(RUN) -m pytest benchmarks -s
 
@@ -41,6 +45,9 @@ lint: $(VENV)/.ready ## check style, types and the lock
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(RUN) tools/check_lock.py
+
+draw: $(VENV)/.ready ## redraw every figure from the table beside it; nothing is executed
+	$(VENV)/bin/replicate draw
 
 readme: $(VENV)/.ready ## bring the claims in README.md up to date with figures/
 	$(RUN) tools/readme.py
@@ -58,7 +65,7 @@ lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check th
 	done
 
 clean: ## remove build products and caches (not .venv)
-	rm -rf build *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build figures/.runs.json *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -path './$(VENV)' -prune -o \
 	    \( -name __pycache__ -o -name .ipynb_checkpoints \) -type d -prune -exec rm -rf {} +
 

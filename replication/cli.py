@@ -11,294 +11,393 @@ import json
 import math
 import os
 import re
+import shlex
 import shutil
 import signal
 import sys
+import tempfile
 import textwrap
 import time
 import warnings
-from collections.abc import Sequence
-from enum import StrEnum
-from importlib import metadata
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any, NoReturn
 
-import typer
-from typer.core import TyperCommand, TyperGroup
+import click
 
 from replication import files
+from replication.errors import UserError, unknown
 
-CLEANING = 5.0
-"""Seconds after an interruption in which another one is not heard: a run is then cleaning up."""
-
-
-class Profile(StrEnum):
-    """How much is run."""
-
-    QUICK = "quick"
-    PAPER = "paper"
+GRACE = 5.0
+"""Grace period after Ctrl-C, in seconds: further signals are ignored during clean-up."""
 
 
-class OneLineErrors(TyperGroup):
-    """Says a user's mistake in one line; a fault of the program keeps its traceback."""
+class OneLineErrors(click.Group):
+    """Reports a user's mistake in one line; a fault of the program keeps its traceback."""
 
-    def invoke(self, ctx: Any) -> Any:
-        """Run the command."""
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run the command, and end with its exit code unless told otherwise."""
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, False, **extra)
         try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            _fail("interrupted", 130)
-        except ValueError as error:
-            if not type(error).__module__.startswith("replication."):
-                raise
-            _fail(str(error))
+            code = super().main(args, prog_name, complete_var, False, **extra)
+        except click.exceptions.NoArgsIsHelpError as error:
+            click.echo(error.message)
+            sys.exit(2)
+        except click.ClickException as error:
+            context = getattr(error, "ctx", None)
+            more = f" (see {context.command_path} --help)" if context else ""
+            _end(f"{error.format_message().rstrip('.')}{more}", error.exit_code)
+        except UserError as error:
+            _end(str(error))
+        except (KeyboardInterrupt, click.Abort):
+            _end("interrupted", 130)
         except OSError as error:
             if error.filename is None:
                 raise
-            _fail(f"{error.filename}: {(error.strerror or str(error)).lower()}")
+            _end(f"{error.filename}: {(error.strerror or str(error)).lower()}")
+        sys.exit(code if isinstance(code, int) else 0)
 
 
-class TwoWords(TyperCommand):
-    """Lets `-p NAME VALUE` take two words; typer's lists hold single ones."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Join the two words of each `-p`, then parse as usual."""
-        joined: list[str] = []
-        rest = list(args)
-        while rest and rest[0] != "--":
-            word = rest.pop(0)
-            if word == "-p":
-                if len(rest) < 2 or not rest[0].isidentifier():
-                    _fail("-p takes two words, a parameter's name and its value: -p trials 10")
-                word = f"-p{rest.pop(0)}={rest.pop(0)}"
-            joined.append(word)
-        return super().parse_args(ctx, joined + rest)
+def _end(message: str, code: int = 2) -> NoReturn:
+    click.echo(f"error: {message}", err=True)
+    sys.exit(code)
 
 
-app = typer.Typer(
-    cls=OneLineErrors,
-    help="Inverse reinforcement learning from correct and incorrect demonstrations, replicated.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+def _values(_: click.Context, __: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
+    """Return the values of `-p NAME VALUE` options: what parses as JSON is JSON, the rest text."""
+    values: dict[str, Any] = {}
+    for name, text in pairs:
+        if not name.isidentifier():
+            raise UserError("-p takes two words, a parameter's name and its value: -p trials 10")
+        if name in values:
+            raise UserError(f"-p {name} is given twice")
+        try:
+            values[name] = json.loads(text, parse_constant=_no_constant)
+        except ValueError:
+            values[name] = text
+    return values
+
+
+def _no_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not JSON")
+
+
+FILE = click.Path(path_type=Path)
+
+parameters_option = click.option(
+    "-p",
+    "parameters",
+    nargs=2,
+    multiple=True,
+    callback=_values,
+    metavar="NAME VALUE",
+    help="Set a parameter; VALUE is JSON, or else text. May be repeated.",
 )
-demos_app = typer.Typer(help="Make and check demonstration files.", no_args_is_help=True)
-app.add_typer(demos_app, name="demos")
-
-Pairs = Annotated[
-    list[str] | None,
-    typer.Option(
-        "-p",
-        metavar="NAME VALUE",
-        help="Set a parameter; VALUE is JSON, or else text. May be repeated.",
-    ),
-]
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"replicate {metadata.version('unified-irl-replication')}")
-        raise typer.Exit
+def number(name: str, least: int | None, text: str, **more: Any) -> Callable[..., Any]:
+    """Return an option that takes a whole number, not below the least one."""
+    kind = click.INT if least is None else click.IntRange(least)
+    return click.option(name, type=kind, help=text, **{"metavar": "N"} | more)
 
 
-@app.callback()
-def main(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Show the version."),
-    ] = False,
-) -> None:
+def folder(text: str, default: Path | None = None) -> Callable[..., Any]:
+    """Return the option --out."""
+    shown = default is not None
+    return click.option(
+        "--out", type=FILE, default=default, show_default=shown, metavar="FOLDER", help=text
+    )
+
+
+def profile_option(text: str = "The profile that the outputs belong to.") -> Callable[..., Any]:
+    """Return the option --profile."""
+    names = click.Choice(["quick", "paper"])
+    return click.option("--profile", type=names, default="paper", show_default=True, help=text)
+
+
+out_option = folder("The outputs.")
+jobs_option = number("--jobs", 1, "Worker processes; one for each usable core by default.")
+
+
+@click.group(
+    "replicate",
+    cls=OneLineErrors,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Inverse reinforcement learning from correct and incorrect demonstrations, replicated.",
+)
+@click.version_option(
+    package_name="unified-irl-replication", message="replicate %(version)s", prog_name="replicate"
+)
+def app() -> None:
     """Take the options that come before a command."""
 
 
-@app.command(
-    cls=TwoWords, epilog="Example: replicate run open_maze --profile quick -p set_trials 4"
+@app.group("demos")
+def demos_group() -> None:
+    """Make and check demonstration files."""
+
+
+# --- notebooks -------------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: replicate run open_maze --profile quick -p set_trials 4")
+@click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
+@profile_option("The paper's number of trials, or a few.")
+@jobs_option
+@number("--seed", 0, "Root seed; the notebook's by default.")
+@folder("Where the outputs go.")
+@number(
+    *("--timeout", 1, "Time that one cell may take."),
+    default=3600,
+    show_default=True,
+    metavar="SECONDS",
 )
+@click.option("--force", is_flag=True, help="Re-run everything, and recompute every trial.")
+@click.option(
+    "--here", is_flag=True, help="Also re-run notebooks whose outputs were made on another machine."
+)
+@click.option("--check", is_flag=True, help="Exit code 1 if files have other bytes than before.")
+@click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS",
+    help="Send trials to a Dask scheduler: tcp://HOST:PORT.",
+)
+@parameters_option
 def run(
-    notebooks: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="NOTEBOOK", help="Names or paths; all by default."),
-    ] = None,
-    profile: Annotated[
-        Profile, typer.Option(help="The paper's number of trials, or a few.")
-    ] = Profile.PAPER,
-    jobs: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Worker processes; one a usable core by default."),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Root seed; the notebook's by default.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where the outputs go.")
-    ] = None,
-    timeout: Annotated[
-        int, typer.Option(min=1, metavar="SECONDS", help="Time that one cell may take.")
-    ] = 3600,
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Run what is up to date, too; compute every trial again."),
-    ] = False,
-    here: Annotated[
-        bool,
-        typer.Option("--here", help="Run what is up to date, too, if it was made elsewhere."),
-    ] = False,
-    scheduler: Annotated[
-        str,
-        typer.Option(metavar="ADDRESS", help="Send trials to a Dask scheduler: tcp://HOST:PORT."),
-    ] = "",
-    parameters: Pairs = None,
+    notebooks: tuple[str, ...],
+    profile: str,
+    seed: int | None,
+    out: Path | None,
+    force: bool,
+    check: bool,
+    parameters: dict[str, Any],
+    **options: Any,
 ) -> None:
-    """Run notebooks and publish their figures, tables and data.
+    """Run notebooks, all by default, and publish their figures, tables and data.
 
     A notebook is skipped if nothing that its outputs depend on has changed. Outputs go to figures;
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
     and store) to build/custom.
     """
-    from replication.pipeline.folders import executed_folder, outputs_folder
+    from replication.pipeline.folders import outputs_folder
     from replication.pipeline.notebook import RunError
     from replication.pipeline.plan import run_name
     from replication.pipeline.run import run_notebooks
 
     _catch_signals()
-    files = [_notebook(one) for one in notebooks] if notebooks else _all_notebooks()
-    values = _values(parameters)
-    name = run_name(profile.value, seed=seed, parameters=values)
-    target = out or outputs_folder(name)
+    paths = [_notebook(name) for name in notebooks] or _all_notebooks()
+    target = out or outputs_folder(run_name(profile, seed=seed, parameters=parameters))
     try:
         published = run_notebooks(
-            list(dict.fromkeys(files)),
-            profile=profile.value,
+            list(dict.fromkeys(paths)),
+            profile=profile,
             out=target,
-            jobs=jobs,
             seed=seed,
-            parameters=values,
-            timeout=timeout,
+            parameters=parameters,
             force=force,
-            here=here,
-            scheduler=scheduler,
-            echo=typer.echo,
+            checks=CHECKS,
+            echo=click.echo,
+            **options,
         )
     except KeyboardInterrupt:
         kept = "finished notebooks" if force else "finished notebooks and trials"
-        _fail(f"interrupted; {kept} are kept, and the same command goes on from there", 130)
+        _end(f"interrupted; {kept} are kept, and the same command goes on from there", 130)
     except RunError as error:
         if error.details:
             plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
-            typer.echo(error.details if sys.stderr.isatty() else plain, err=True)
-        _fail(str(error), 1)
-    for table in published:
-        if table.suffix == ".md" and table.stem != "claims":
-            typer.echo(f"\n{table.name}\n\n{table.read_text(encoding='utf-8').strip()}")
-    typer.echo(f"\noutputs ({len(published)} new): {_short(target)}")
-    typer.echo(f"executed notebooks: {_short(executed_folder(target, name))}")
-    if any(file.stem == "claims" for file in files) and (target / "claims.csv").exists():
+            click.echo(error.details if sys.stderr.isatty() else plain, err=True)
+        _end(str(error), 1)
+    except UserError as error:
+        _end(f"{error}{_example(str(error), parameters)}")
+    new = [file for notebook in published for file in notebook.files]
+    for table in new:
+        if table.suffix == ".md" and table.parent.name != "claims":
+            title = f"{table.parent.name}/{table.name}"
+            click.echo(f"\n{title}\n\n{table.read_text(encoding='utf-8').strip()}")
+    click.echo(f"\noutputs ({len(new)} new): {_short(target)}")
+    verdicts = target / "claims" / "verdicts.csv"
+    if any(path.stem == "claims" for path in paths) and verdicts.exists():
         from replication.evidence.tables import read_table, verdict_lines
 
-        lines = verdict_lines(read_table(target / "claims.csv"))
-        typer.echo("\nThe paper's claims:\n" + "\n".join(lines))
+        click.echo("\nThe paper's claims:\n" + "\n".join(verdict_lines(read_table(verdicts))))
+    changed = [_short(file) for notebook in published for file in notebook.changed]
+    if check and changed:
+        _end(f"other bytes than published before: {', '.join(changed)}", 1)
+
+
+def _check_claims() -> None:
+    from replication.evidence.claims import load_claims
+
+    load_claims()
+
+
+def _check_specifications() -> None:
+    from replication.evidence.specifications import check_declared
+
+    check_declared()
+
+
+CHECKS: dict[str, Callable[[], object]] = {
+    "replication/evidence/claims.toml": _check_claims,
+    "replication/evidence/specifications.toml": _check_specifications,
+}
+"""What is checked before a notebook runs that reads one of these files."""
+
+
+def _example(message: str, parameters: Mapping[str, Any]) -> str:
+    """Show how to take the kinds that a file has, if it lacks one that was asked for."""
+    if "has no incorrect demo of kind" not in message:
+        return ""
+    given = parameters.get("choices", {})
+    choices = {**(given if isinstance(given, dict) else {}), "incorrect": "all"}
+    return f", such as -p choices {shlex.quote(json.dumps(choices))}"
+
+
+@app.command(epilog="Example: replicate draw fig05")
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@profile_option()
+@out_option
+def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
+    """Redraw figures, all by default, from the tables beside them; nothing is executed.
+
+    A NAME is that of a figure, such as fig05 or open_maze/fig05, or of a notebook.
+    """
+    from replication.pipeline.folders import outputs_folder
+    from replication.pipeline.redraw import redraw
+
+    redraw(out or outputs_folder(profile), names, draw=_drawn, echo=click.echo)
+
+
+def _drawn(code: str, table: Path) -> dict[str, bytes]:
+    """Draw a figure by a function of the package; return its files by suffix."""
+    from replication.evidence.tables import read_table
+    from replication.report.style import save_figure
+
+    module, _, name = code.rpartition(".")
+    if not module.startswith("replication."):
+        raise UserError("only functions of the package draw")
+    figure = getattr(import_module(module), name)(read_table(table))
+    with tempfile.TemporaryDirectory() as folder:
+        paths = save_figure(figure, Path(folder) / "figure", ("png", "svg"))
+        return {path.suffix: path.read_bytes() for path in paths}
 
 
 @app.command(epilog="Example: replicate status")
-def status(
-    profile: Annotated[
-        Profile, typer.Option(help="The profile that the outputs belong to.")
-    ] = Profile.PAPER,
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
-) -> None:
-    """Say which figures and tables are up to date, why others are not, and what to do."""
-    from replication.pipeline.folders import executed_folder, outputs_folder
+@profile_option()
+@out_option
+def status(profile: str, out: Path | None) -> None:
+    """Show which figures and tables are up to date, why others are not, and what to do."""
+    from replication.pipeline.folders import outputs_folder
     from replication.pipeline.plan import prepare
     from replication.pipeline.status import status_lines
 
     target = out or outputs_folder(profile)
-    runs = prepare(_all_notebooks(), profile=profile)
-    folder = executed_folder(target, profile)
-    options = ["--profile", profile.value] if profile is not Profile.PAPER else []
+    options = ["--profile", profile] if profile != "paper" else []
     options += ["--out", str(out)] if out else []
-    typer.echo("\n".join(status_lines(runs, target, folder, options)))
+    runs = prepare(_all_notebooks(), profile=profile, out=target)
+    click.echo("\n".join(status_lines(runs, target, options)))
 
 
 @app.command(epilog="Example: replicate verify")
-def verify(
-    profile: Annotated[
-        Profile, typer.Option(help="The profile that the outputs belong to.")
-    ] = Profile.PAPER,
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Worker processes.")] = None,
-) -> None:
+@profile_option()
+@out_option
+@jobs_option
+def verify(profile: str, out: Path | None, jobs: int | None) -> None:
     """Prove the outputs: hash the files, check the packages, recompute one trial in twenty.
 
     Exit code 0 if everything agrees, else 1.
     """
     import joblib
 
-    from replication.pipeline import verify
+    _catch_signals()
+    wrong = list(_disagreements(profile, out, jobs or joblib.cpu_count()))
+    for line in wrong:
+        click.echo(f"error: {line}", err=True)
+    click.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
+    sys.exit(int(bool(wrong)))
+
+
+def _disagreements(profile: str, out: Path | None, jobs: int) -> Iterator[str]:
+    """Check everything; say what is being done, and yield what is wrong."""
+    from replication.evidence.recompute import EVERY, recompute_trials
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.plan import prepare
+    from replication.pipeline.verify import verify_inputs, verify_outputs, verify_packages
 
-    _catch_signals()
-    runs, target = prepare(_all_notebooks(), profile=profile), out or outputs_folder(profile)
+    target = out or outputs_folder(profile)
+    click.echo(f"hashing the outputs in {target.name} and what they depend on")
+    yield from verify_outputs(target)
+    yield from verify_inputs(prepare(_all_notebooks(), profile=profile, out=target), target)
+    click.echo("comparing the installed packages with environment.lock")
+    yield from verify_packages(files.PROJECT / "environment.lock")
+
+    def report(number: int) -> None:
+        if number:
+            click.echo(f"recomputing {number} trials, one in {EVERY}")
+
     store = files.PROJECT / "build" / "trials.sqlite"
-    jobs = jobs or joblib.cpu_count()
-    wrong = verify.verify(runs, target, store, jobs=jobs, echo=typer.echo)
-    for one in wrong:
-        typer.echo(f"error: {one}", err=True)
-    typer.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
-    raise typer.Exit(int(bool(wrong)))
+    yield from recompute_trials(target, store, jobs=jobs, report=report)
 
 
 @app.command(epilog="Example: replicate clean --dry-run")
-def clean(
-    profile: Annotated[
-        Profile, typer.Option(help="The profile that the outputs belong to.")
-    ] = Profile.PAPER,
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="The outputs.")] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only say what would be removed.")
-    ] = False,
-) -> None:
-    """Remove files among the outputs that no notebook declares, and records of lost notebooks."""
-    from replication.pipeline import cleaning
+@profile_option()
+@out_option
+@click.option("--dry-run", is_flag=True, help="Only show what would be removed.")
+def clean(profile: str, out: Path | None, dry_run: bool) -> None:
+    """Remove outputs that no notebook declares any more."""
+    from replication.pipeline import status
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.plan import prepare
 
-    runs = prepare(_all_notebooks(), profile=profile)
-    cleaning.clean(runs, out or outputs_folder(profile), dry_run=dry_run, echo=typer.echo)
+    target = out or outputs_folder(profile)
+    runs = prepare(_all_notebooks(), profile=profile, out=target)
+    status.clean(runs, target, dry_run=dry_run, echo=click.echo)
 
 
 @app.command(epilog="Example: replicate site")
-def site(
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the site goes.")] = Path(
-        "build/site"
-    ),
-) -> None:
+@folder("Where the site goes.", Path("build/site"))
+def site(out: Path) -> None:
     """Build the report from the published results; nothing is executed."""
     from replication.site.build import build_site
 
-    first = build_site(_all_notebooks(), out, echo=typer.echo)
-    typer.echo(f"open {first.resolve().as_uri()} in a browser")
+    first = build_site(_all_notebooks(), out, echo=click.echo)
+    click.echo(f"open {first.resolve().as_uri()} in a browser")
 
 
-@app.command(cls=TwoWords, epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")
+# --- demonstrations --------------------------------------------------------------------------
+
+
+@app.command(epilog="Example: replicate learn mine.json --incorrect hit -p alpha 0.1")
+@click.argument("file", type=FILE)
+@click.option(
+    "--method",
+    default="unified-incorrect",
+    show_default=True,
+    metavar="METHOD",
+    help="adaboost, unified or unified-incorrect.",
+)
+@number("--seed", 0, "Root seed.", default=0)
+@click.option(
+    "--incorrect",
+    metavar="SET",
+    help="Incorrect demos: all (the default), none, or kinds joined by +.",
+)
+@parameters_option
+@folder("Where the result goes.", Path("build/learn"))
 def learn(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A demonstration file.")],
-    method: Annotated[
-        str, typer.Option(metavar="METHOD", help="adaboost, unified or unified-incorrect.")
-    ] = "unified-incorrect",
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Root seed.")] = 0,
-    incorrect: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SET", help="Incorrect demos: all (the default), none, or kinds joined by +."
-        ),
-    ] = None,
-    parameters: Pairs = None,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result goes.")] = Path(
-        "build/learn"
-    ),
+    file: Path, method: str, seed: int, incorrect: str | None, parameters: dict[str, Any], out: Path
 ) -> None:
     """Learn a reward from the demonstrations of a file.
 
@@ -313,76 +412,63 @@ def learn(
 
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
-        _fail(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
-    values = _values(parameters)
-    if "incorrect" in values:
-        _fail("-p incorrect is not taken here; choose the incorrect demos with --incorrect SET")
-    params = Params.of(incorrect="all", **values)
-    with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
+        raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
+    if "incorrect" in parameters:
+        raise UserError("-p incorrect is not taken here; choose the demos with --incorrect SET")
+    params = Params.of(incorrect="all", **parameters)
+    with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")
     result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
     saved = result.save(f"{stem}.json")
     style.save_figure(figures.fit_figure(result), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
-    typer.echo(
+    click.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
         f"d = {result.errors[-1]:.4g}"
     )
-    typer.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
+    click.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
 
 
-@demos_app.command(
+@demos_group.command(
     epilog="Example: replicate demos make map.txt --task mine --out mine.json --leg 2"
 )
-def make(
-    map_file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MAP", help="A text file: . free, # obstacle, S start, G goal; one line a row."
-        ),
-    ],
-    task: Annotated[
-        str, typer.Option(metavar="NAME", help="Name of the task, which its files bear.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The demonstration file to write.")],
-    leg: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Cells of a straight leg (choice DEMO-SHAPE)."),
-    ] = None,
-    detour_width: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Cells that a detour keeps off (choice DETOUR-WIDTH)."),
-    ] = None,
-) -> None:
+@click.argument("map_file", metavar="MAP", type=FILE)
+@click.option("--task", required=True, metavar="NAME", help="Name of the task.")
+@click.option(
+    "--out", required=True, type=FILE, metavar="FILE", help="The demonstration file to write."
+)
+@number("--leg", None, "Cells of a straight leg (choice DEMO-SHAPE).")
+@number("--detour-width", None, "Cells that a detour keeps off (choice DETOUR-WIDTH).")
+def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     """Let the scripted expert demonstrate in a maze of your own.
 
-    Writes one correct demo and incorrect ones of each kind, by the rules of the stored mazes.
+    MAP is a text file, one line a row: . free, # obstacle, S start, G goal. Writes one correct demo
+    and incorrect ones of each kind, by the rules of the stored mazes.
     """
     from replication.demos.files import save_demos
     from replication.demos.maze_expert import Expert, demonstrate
     from replication.envs.maze import Maze, MazeError
 
-    given: dict[str, Any] = {"leg": leg, "detour_width": detour_width}
-    params = Expert(**{name: value for name, value in given.items() if value is not None})
+    given: dict[str, Any] = {name: value for name, value in rules.items() if value is not None}
+    params = Expert(**given)
+    # a byte that is no UTF-8 becomes a character that the map refuses, with its place
+    text = map_file.read_text(encoding="utf-8-sig", errors="replace")
     try:
-        # a byte that is no UTF-8 becomes a character that the map refuses, with its place
-        maze = Maze.from_text(map_file.read_text(encoding="utf-8-sig", errors="replace"))
+        maze = Maze.from_text(text)
     except MazeError as error:
-        _fail(f"{map_file}: {error}")
+        raise UserError(f"{map_file}: {error}") from error
     demos = demonstrate(task, maze, params=params)
     save_demos(demos, out)
     kinds = [demo.kind for demo in demos.incorrect]
     counts = [f"{kinds.count(kind)} {kind}" for kind in demos.kinds]
-    typer.echo(f"{task}: {', '.join([f'{len(demos.correct)} correct', *counts])}")
-    typer.echo(f"demos: {_short(out)}")
+    click.echo(f"{task}: {', '.join([f'{len(demos.correct)} correct', *counts])}")
+    click.echo(f"demos: {_short(out)}")
 
 
-@demos_app.command(epilog="Example: replicate demos check mine.json")
-def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Files to check.")],
-) -> None:
+@demos_group.command(epilog="Example: replicate demos check mine.json")
+@click.argument("paths", metavar="FILE...", nargs=-1, required=True, type=FILE)
+def check(paths: tuple[Path, ...]) -> None:
     """Check demonstration files, move by move.
 
     A warning is about a file that can be used, an error about one that cannot: exit code 1.
@@ -391,36 +477,50 @@ def check(
     from replication.demos.files import check_demos
 
     failed = False
-    for file in files:
+    for path in paths:
         try:
-            found = check_demos(file)
+            doubts = check_demos(path)
         except DemoError as error:
-            typer.echo(f"error: {error}", err=True)
+            click.echo(f"error: {error}", err=True)
             failed = True
             continue
-        for warning in found:
-            typer.echo(f"warning: {warning}")
-        if not found:
-            typer.echo(f"{file}: ok")
-    raise typer.Exit(int(failed))
+        for doubt in doubts:
+            click.echo(f"warning: {doubt}")
+        if not doubts:
+            click.echo(f"{path}: ok")
+    sys.exit(int(failed))
 
 
-@demos_app.command(epilog="Example: replicate demos schema > schema.json")
+@demos_group.command(epilog="Example: replicate demos schema > schema.json")
 def schema() -> None:
     """Print the JSON Schema of demonstration files."""
     from replication.demos.schema import json_schema
 
-    typer.echo(json.dumps(json_schema(), indent=2))
+    click.echo(json.dumps(json_schema(), indent=2))
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Show warnings in one line each."""
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        click.echo(f"warning: {message}", err=True)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
+# --- choices ---------------------------------------------------------------------------------
 
 
 @app.command(epilog="Example: replicate choices ALPHA")
-def choices(
-    id: Annotated[
-        str | None, typer.Argument(metavar="ID", help="One choice, to be shown in full.")
-    ] = None,
-) -> None:
-    """List what the paper leaves open, what we chose, and what else is accepted."""
-    from replication.errors import unknown
+@click.argument("id", required=False)
+def choices(id: str | None) -> None:
+    """List what the paper leaves open, what we chose, and what else is accepted.
+
+    With an ID, show that choice in full.
+    """
     from replication.paper.register import load_choices
 
     entries = load_choices()
@@ -428,35 +528,31 @@ def choices(
     if id is None:
         rows = [("ID", "DEFAULT", "ALTERNATIVES", "FIELD, DATA OR CODE")]
         rows += [
-            (one.id, str(one.default), _accepted(one), one.field or one.data or one.code)
-            for one in entries.values()
+            (
+                entry.id,
+                str(entry.default),
+                _accepted(entry),
+                entry.field or entry.data or entry.code,
+            )
+            for entry in entries.values()
         ]
         _print_table(rows, width)
         return
     if id.upper() not in entries:
-        _fail(unknown(id.upper(), entries, "choice"))
-    one = entries[id.upper()]
-    lines = {
-        "id": one.id,
-        "place": one.place,
-        "open": one.open,
-        "default": str(one.default),
-        "rule": one.rule,
-        "alternatives": _accepted(one),
-        "field": one.field,
-        "data": one.data,
-        "code": one.code,
-    }
-    for key, value in lines.items():
+        raise UserError(unknown(id.upper(), entries, "choice"))
+    entry = entries[id.upper()]
+    fields = ("id", "place", "open", "default", "rule", "alternatives", "field", "data", "code")
+    for key in fields:
+        value = _accepted(entry) if key == "alternatives" else str(getattr(entry, key))
         if value:
             head = f"{key + ':':<14}"
-            typer.echo(textwrap.fill(head + value, width, subsequent_indent=" " * 14))
+            click.echo(textwrap.fill(head + value, width, subsequent_indent=" " * 14))
 
 
-def _accepted(one: Any) -> str:
-    if one.range is not None:
-        return f"{one.range[0]:g} to {one.range[1]:g}"
-    return ", ".join(map(str, one.alternatives))
+def _accepted(entry: Any) -> str:
+    if entry.range is not None:
+        return f"{entry.range[0]:g} to {entry.range[1]:g}"
+    return ", ".join(map(str, entry.alternatives))
 
 
 def _print_table(rows: Sequence[tuple[str, ...]], width: int) -> None:
@@ -467,7 +563,10 @@ def _print_table(rows: Sequence[tuple[str, ...]], width: int) -> None:
         cells = [[row[0]], *(textwrap.wrap(cell, share) for cell in row[1:])]
         for parts in zip_longest(*cells, fillvalue=""):
             padded = [f"{part:<{share if at else first}}" for at, part in enumerate(parts)]
-            typer.echo("  ".join(padded).rstrip())
+            click.echo("  ".join(padded).rstrip())
+
+
+# --- what the commands share -----------------------------------------------------------------
 
 
 def _notebook(name: str) -> Path:
@@ -475,42 +574,20 @@ def _notebook(name: str) -> Path:
     path = Path(name)
     if path.suffix == ".ipynb" or len(path.parts) > 1:
         found = files.resolve(path)
-        return found if found.exists() else _fail(f"there is no notebook {name}")
-    known = [one.stem for one in _all_notebooks()]
+        if not found.exists():
+            raise UserError(f"there is no notebook {name}")
+        return found
+    known = [path.stem for path in _all_notebooks()]
     if name not in known:
-        from replication.errors import unknown
-
-        _fail(unknown(name, known, "notebook"))
+        raise UserError(unknown(name, known, "notebook"))
     return files.PROJECT / "notebooks" / f"{name}.ipynb"
 
 
 def _all_notebooks() -> list[Path]:
     found = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
     if not found:
-        _fail(f"there is no notebook in {files.PROJECT / 'notebooks'}")
+        raise UserError(f"there is no notebook in {files.PROJECT / 'notebooks'}")
     return found
-
-
-def _values(pairs: list[str] | None) -> dict[str, Any]:
-    """Return the values of joined `NAME=VALUE` words."""
-    values: dict[str, Any] = {}
-    for pair in pairs or []:
-        name, _, text = pair.partition("=")
-        if name in values:
-            _fail(f"-p {name} is given twice")
-        try:
-            values[name] = json.loads(text, parse_constant=_no_constant)
-        except ValueError:
-            values[name] = text
-    return values
-
-
-def _no_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not JSON")
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {message}", err=True)
 
 
 def _short(path: Path) -> str:
@@ -521,24 +598,19 @@ def _short(path: Path) -> str:
 
 
 def _catch_signals() -> None:
-    """Let a polite kill end like Ctrl-C: kernel and workers stop, and the stage is removed."""
+    """Treat SIGTERM like Ctrl-C: kernel and workers stop, and drafts are removed."""
     last = -math.inf
 
     def interrupt(*_: object) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last > CLEANING:
+        if now - last > GRACE:
             last = now
             raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # While the interpreter ends, it would else give up this handler, and die of the signal.
+        # At exit Python restores the default handler; ignore the signal instead.
         atexit.register(signal.signal, number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, interrupt)
-
-
-def _fail(message: str, code: int = 2) -> NoReturn:
-    typer.echo(f"error: {message}", err=True)
-    raise typer.Exit(code)

@@ -11,6 +11,10 @@ from typing import Any
 class UserError(ValueError):
     """A mistake in what the user gave; the message says in one line where, and how to fix it."""
 
+    def _render_traceback_(self) -> list[str]:
+        """Show one line in a notebook instead of a traceback; IPython asks for it by this name."""
+        return [f"error: {self}"]
+
 
 def unknown(name: str, known: Iterable[str], what: str) -> str:
     """Return the message about an unknown `name`, with the most similar of the `known` ones first.

@@ -50,3 +50,10 @@ def resolve(path: str | os.PathLike[str]) -> Path:
     """
     given = Path(path)
     return Path.cwd() / given if given.exists() else PROJECT / given
+
+
+def shown_as(path: Path) -> str:
+    """Return a path for readers: from the project on, or only its name if it lies elsewhere."""
+    absolute = path.resolve()
+    inside = absolute.is_relative_to(PROJECT)
+    return absolute.relative_to(PROJECT).as_posix() if inside else path.name

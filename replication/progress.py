@@ -1,7 +1,7 @@
-"""Progress that a person can live with: bars on a terminal, a line each 10 % in a log.
+"""Progress reports: bars on a terminal, a line every 10 % in a log.
 
-A notebook's kernel does not draw. It sends events to the process that runs the notebooks, through
-the pipe that the environment variable REPLICATION_EVENTS names, and that process shows them.
+A notebook's kernel does not draw. It keeps a line of JSON in the file that the environment variable
+REPLICATION_EVENTS names; the process that runs the notebooks polls that file and shows it.
 """
 
 from __future__ import annotations
@@ -9,19 +9,25 @@ from __future__ import annotations
 import json
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Self, TextIO
+from typing import Self
 
 from tqdm import tqdm
 
 EVENTS = "REPLICATION_EVENTS"
+"""Environment variable with the file in which a kernel reports its progress."""
+
+SCHEDULER = "REPLICATION_SCHEDULER"
+"""Environment variable with the address of a Dask scheduler that trials are sent to."""
+
+PAUSE = 0.1
+"""Seconds between two reports of a kernel."""
 
 Report = Callable[[int, int], None]
-"""Told how many trials finished, and how many learning steps they took."""
+"""Takes how many trials finished, and how many learning steps they took."""
 
 
 @contextmanager
@@ -34,26 +40,39 @@ def trial_meter(total: int, progress: bool | None = None) -> Iterator[Report]:
         Number of trials to come.
     progress
         Whether to draw a bar; None reports to the process that runs the notebook if there is one,
-        and else draws a bar on a terminal.
+        and otherwise draws a bar on a terminal.
     """
-    pipe = os.environ.get(EVENTS)
-    if progress is None and pipe:
-        with Path(pipe).open("w", encoding="utf-8") as events:
-
-            def send(**event: Any) -> None:
-                print(json.dumps(event), file=events, flush=True)
-
-            send(total=total)
-            yield lambda trials, steps: send(trials=trials, steps=steps)
-            send(total=0)
+    file = os.environ.get(EVENTS)
+    if progress is None and file:
+        yield _reporter(Path(file), total)
         return
     shown = sys.stderr.isatty() if progress is None else progress
     with TrialBar(total, shown=shown) as bar:
         yield bar.update
 
 
+def _reporter(file: Path, total: int) -> Report:
+    """Return a report that keeps the sums in a file, which is replaced as a whole."""
+    began = time.monotonic_ns()  # tells this set of trials from the one before
+    trials = steps = 0
+    last = -PAUSE
+
+    def report(more: int, more_steps: int) -> None:
+        nonlocal trials, steps, last
+        trials, steps = trials + more, steps + more_steps
+        now = time.monotonic()
+        if now - last >= PAUSE or trials >= total:
+            last = now
+            draft = file.with_suffix(".new")
+            draft.write_text(json.dumps([began, total, trials, steps]), encoding="utf-8")
+            draft.replace(file)
+
+    report(0, 0)
+    return report
+
+
 class TrialBar:
-    """A bar of trials with rate and time left; in a log, a line each 10 %.
+    """A bar of trials with rate and time left; in a log, a line every 10 %.
 
     Parameters
     ----------
@@ -62,16 +81,14 @@ class TrialBar:
     shown
         Whether to draw a bar.
     lines
-        Where to write lines instead, if anywhere.
+        Whether to write lines to stderr.
     position
         Line of the terminal, from the first bar on.
     """
 
-    def __init__(
-        self, total: int, *, shown: bool, lines: TextIO | None = None, position: int = 0
-    ) -> None:
-        self._lines = lines
-        self._total, self._done, self._steps, self._said = total, 0, 0, 0
+    def __init__(self, total: int, *, shown: bool, lines: bool = False, position: int = 0) -> None:
+        self.trials = self.steps = 0
+        self._total, self._tenth, self._lines = total, 0, lines
         self._began = time.monotonic()
         self._bar = tqdm(
             total=total, unit="trial", disable=not shown, leave=False, position=position
@@ -89,18 +106,19 @@ class TrialBar:
 
     def update(self, trials: int, steps: int) -> None:
         """Count trials that finished, and their learning steps."""
-        self._done += trials
-        self._steps += steps
+        self.trials += trials
+        self.steps += steps
         elapsed = max(time.monotonic() - self._began, 1e-9)
-        rate = _rate(self._steps / elapsed)
+        rate = _rate(self.steps / elapsed)
         self._bar.update(trials)
         self._bar.set_postfix_str(rate)
-        tenth = 10 * self._done // self._total
-        if self._lines is not None and tenth > self._said:
-            self._said = tenth
-            left = elapsed * (self._total - self._done) / self._done
-            said = f"{10 * tenth:3d} % of {self._total} trials, {rate}, {_duration(left)} left"
-            print(f"  {said}", file=self._lines, flush=True)
+        tenth = 10 * self.trials // self._total
+        if self._lines and tenth > self._tenth:
+            self._tenth = tenth
+            left = _duration(elapsed * (self._total - self.trials) / self.trials)
+            text = f"  {10 * tenth:3d} % of {self._total} trials, {rate}, {left} left"
+            with suppress(OSError):  # nobody reads the log, as behind `| head`
+                tqdm.write(text, file=sys.stderr)
 
 
 class Display:
@@ -116,6 +134,7 @@ class Display:
 
     def __init__(self, notebooks: int, *, bars: bool) -> None:
         self._bars = bars
+        self._began = 0
         self._trials: TrialBar | None = None
         self._notebooks = tqdm(
             total=notebooks, unit="notebook", disable=not bars, leave=False, position=0
@@ -129,7 +148,7 @@ class Display:
         self._notebooks.close()
 
     def begin(self, name: str) -> None:
-        """Say which notebook is running."""
+        """Name the notebook that is running."""
         self._notebooks.set_description(name)
 
     def end(self) -> None:
@@ -137,40 +156,18 @@ class Display:
         self._close_trials()
         self._notebooks.update()
 
-    def event(self, event: dict[str, Any]) -> None:
-        """Show an event of :func:`trial_meter`."""
-        if "total" in event:
-            self._close_trials()
-            if event["total"]:
-                lines = None if self._bars else sys.stderr
-                self._trials = TrialBar(event["total"], shown=self._bars, lines=lines, position=1)
-        elif self._trials is not None:
-            self._trials.update(event["trials"], event["steps"])
-
-    @contextmanager
-    def listen(self, pipe: Path) -> Iterator[None]:
-        """Show the events that come through a pipe, which is made for it."""
-        os.mkfifo(pipe)
-        # Open at both ends, the pipe neither blocks nor ends while kernels come and go.
-        reader = os.open(pipe, os.O_RDWR)
-
-        def read() -> None:
-            with os.fdopen(reader, encoding="utf-8", errors="replace") as events:
-                for line in events:
-                    if line.endswith("end\n"):
-                        return
-                    # What a killed kernel left half-written; a reader that ends blocks kernels.
-                    with suppress(ValueError, KeyError, TypeError, OSError):
-                        self.event(json.loads(line))
-
-        thread = threading.Thread(target=read, daemon=True)
-        thread.start()
+    def poll(self, file: Path) -> None:
+        """Show what a kernel has reported in a file, see :func:`trial_meter`."""
         try:
-            yield
-        finally:
-            with pipe.open("w", encoding="utf-8") as last:
-                last.write("end\n")
-            thread.join(timeout=5)
+            began, total, trials, steps = map(int, json.loads(file.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):  # no report, or not one of ours
+            return
+        if began != self._began or self._trials is None:
+            self._close_trials()
+            self._began = began
+            self._trials = TrialBar(total, shown=self._bars, lines=not self._bars, position=1)
+        if trials > self._trials.trials:
+            self._trials.update(trials - self._trials.trials, steps - self._trials.steps)
 
     def _close_trials(self) -> None:
         if self._trials is not None:
@@ -179,7 +176,7 @@ class Display:
 
 
 def _rate(steps: float) -> str:
-    """Return a number of steps a second; those of physics are dear.
+    """Return a number of steps a second.
 
     Examples
     --------

@@ -7,7 +7,7 @@ import nbformat
 import pytest
 
 from replication import Demos, Maze, demonstrate, files, load_demos
-from replication.files import PROJECT, write_file
+from replication.files import PROJECT
 from replication.pipeline import execute as execution
 from replication.pipeline.notebook import Notebook
 
@@ -37,10 +37,10 @@ def stored_demos(request: pytest.FixtureRequest) -> Demos:
 def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project in which "executing" a notebook writes each of its outputs."""
 
-    def execute(notebook: Notebook, values: Any, stage: Path, *, executed: Path, **_: Any) -> None:
-        for name in notebook.outputs:
+    def execute(notebook: Notebook, values: Any, stage: Path, **_: Any) -> str:
+        for name in notebook.declared.outputs:
             (stage / name).write_text(notebook.name)
-        write_file(executed, str(nbformat.writes(notebook.load())))
+        return str(nbformat.writes(notebook.load()))
 
     monkeypatch.setattr(files, "PROJECT", tmp_path)
     monkeypatch.setattr(execution, "execute", execute)

@@ -12,16 +12,21 @@ import time
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import pandas as pd
 import pytest
+from click.testing import CliRunner, Result
+from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_notebook
-from typer.testing import CliRunner, Result
 
 from replication import Fit, Maze, MazeError, cli, demonstrate, files, load_demos, save_demos
 from replication.demos.maze_expert import Expert
 from replication.demos.model import Demos
 from replication.demos.schema import json_schema
+from replication.errors import UserError
+from replication.evidence import claims, specifications
 from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.pipeline import run
@@ -41,6 +46,14 @@ def refused(*words: str | Path) -> str:
     return result.stderr
 
 
+def refused_late(*words: str | Path) -> str:
+    """Return the error line of a command that is refused by a cell."""
+    result = replicate(*words)
+    assert result.exit_code == 2
+    assert re.fullmatch(r"error: .+\n", result.stderr)
+    return result.stderr
+
+
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project folder with one notebook, `toy`, that writes the table `seen.md`."""
@@ -54,7 +67,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ]
     cells[0].metadata["tags"] = ["parameters"]
     node = new_notebook(cells=cells)
-    node.metadata["replication"] = {"outputs": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
+    node.metadata["replication"] = {"data": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
     (tmp_path / "notebooks").mkdir()
     nbformat.write(node, tmp_path / "notebooks" / "toy.ipynb")
     (tmp_path / "environment.lock").touch()
@@ -79,10 +92,9 @@ def test_run_writes_shows_and_tells(project: Path) -> None:
     result = replicate("run", "--profile", "quick", *words)
     assert result.exit_code == 0
     table = "| -4 | 'x=y' | 9 | 2 |"
-    assert (project / "build" / "custom" / "seen.md").read_text() == table
+    assert (project / "build" / "custom" / "toy" / "seen.md").read_text() == table
     assert table in result.stdout
     assert f"outputs (2 new): {project / 'build' / 'custom'}\n" in result.stdout
-    assert str(project / "build" / "executed" / "custom") in result.stdout
     assert not (project / "figures").exists()
 
 
@@ -101,28 +113,26 @@ def test_only_the_paper_as_it_is_goes_to_figures(
 ) -> None:
     """A run that may give other results than the profile's has a folder of its own."""
     assert replicate("run", *words, "--jobs", "1").exit_code == 0
-    assert [path.parent for path in project.rglob("seen.md")] == [project / folder]
-    assert len(list(project.rglob("build/executed/*/toy.ipynb"))) == 1
+    assert [path.parent for path in project.rglob("seen.md")] == [project / folder / "toy"]
 
 
 def test_tables_are_shown_by_their_names(project: Path) -> None:
-    """Each table has its name, in the order of the notebooks, and shared files count once."""
+    """Each table has its name, with that of its notebook, in the order of the notebooks."""
     for name in ("a", "b"):
-        tables = [f"{name}.md", f"{name}_sets.md"]
         cells = [
             new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
             new_code_cell(
-                f"from pathlib import Path\nfor name in {[*tables, 'trials.csv']}:\n"
-                "    (Path(out) / name).write_text(f'| {name} |\\n')"
+                "from pathlib import Path\n"
+                "for name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
+                f"    (Path(out) / name).write_text('| {name} |\\n')"
             ),
         ]
-        declared = {"outputs": tables, "merged": ["trials.csv"]}
-        node = new_notebook(cells=cells, metadata={"replication": declared})
+        node = new_notebook(cells=cells, metadata={"replication": {"tables": ["main", "sets"]}})
         nbformat.write(node, project / "notebooks" / f"{name}.ipynb")
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
-    assert titles == [(name, name) for name in ("a.md", "a_sets.md", "b.md", "b_sets.md")]
-    assert "\noutputs (7 new): " in shown
+    assert titles == [(f"{n}/{t}.md", n) for n in ("a", "b") for t in ("main", "sets")]
+    assert "\noutputs (10 new): " in shown
     assert "claims" not in shown
 
 
@@ -141,17 +151,17 @@ def test_claims_are_shown_last(
         new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
         new_code_cell(
             "from pathlib import Path\nfolder = Path(out)\n"
-            f"(folder / 'claims.csv').write_text({table!r})\n"
-            "(folder / 'claims.md').write_text('| long table |\\n')"
+            f"(folder / 'verdicts.csv').write_text({table!r})\n"
+            "(folder / 'verdicts.md').write_text('| long table |\\n')"
         ),
     ]
-    declared = {"outputs": ["claims.csv", "claims.md"]}
+    declared = {"tables": ["verdicts"]}
     node = new_notebook(cells=cells, metadata={"replication": declared})
     nbformat.write(node, project / "notebooks" / "claims.ipynb")
     monkeypatch.chdir(project)
     shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
     assert "long table" not in shown
-    assert shown.index("executed notebooks: ") < shown.index("The paper's claims:")
+    assert shown.index("outputs (3 new)") < shown.index("The paper's claims:")
     lines = [line.split() for line in shown.splitlines()[-4:]]
     assert " ".join(lines[0]) == "The paper's claims:"
     assert [line[0] for line in lines[1:]] == ["verdict", "partly", "not"]
@@ -166,7 +176,8 @@ def test_failing_cell_shows_its_traceback(project: Path) -> None:
     assert "\x1b" not in result.stderr
     last = result.stderr.splitlines()[-1]
     assert re.fullmatch(r"error: .*toy\.ipynb: cell 2 failed: ValueError: no trials", last)
-    assert [path.name for path in (project / "here").glob("*.*")] == [".lock"]
+    assert [path.name for path in (project / "here").glob("*")] == [".lock"]
+    assert (project / "build" / "failed" / "toy.ipynb").exists()
 
 
 def test_run_refuses_in_one_line(project: Path) -> None:
@@ -177,7 +188,7 @@ def test_run_refuses_in_one_line(project: Path) -> None:
     assert "'name' is text" in refused("run", "-p", "name", "1")
     assert "'trials' is a whole number" in refused("run", "-p", "trials", "NaN")
     assert "'trials' is a whole number" in refused("run", "-p", "trials", "1.0")
-    assert "-p takes two words" in refused("run", "-p", "trials")
+    assert "'-p' requires 2 arguments" in refused("run", "-p", "trials")
     assert "-p takes two words" in refused("run", "-p", "trials=1", "toy")
     assert "-p trials is given twice" in refused("run", "-p", "trials", "1", "-p", "trials", "2")
     assert "use --out" in refused("run", "-p", "out", "x")
@@ -220,7 +231,7 @@ def test_refusal_in_a_cell_is_one_line(project: Path) -> None:
 )
 def test_values_are_json_or_else_text(text: str, value: object) -> None:
     """What parses as JSON is JSON, everything else is text."""
-    assert cli._values([f"name={text}"]) == {"name": value}
+    assert cli._values(None, None, [("name", text)]) == {"name": value}  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
@@ -233,15 +244,15 @@ def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
             ".write_text(f'{os.getpid()}\\n')\ntime.sleep(300)"
         ),
     ]
-    node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
+    node = new_notebook(cells=cells, metadata={"replication": {}})
     nbformat.write(node, tmp_path / "sleep.ipynb")
     (tmp_path / "environment.lock").touch()
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from pathlib import Path; from replication import cli, paths\n"
-        f"paths.PROJECT = Path({str(tmp_path)!r}); cli.app()"
+        "from pathlib import Path; from replication import cli, files\n"
+        f"files.PROJECT = Path({str(tmp_path)!r}); cli.app()"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code, "run", str(tmp_path / "sleep.ipynb")],
@@ -273,9 +284,9 @@ def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.Monke
     interrupt = handlers[signal.SIGTERM]
     with pytest.raises(KeyboardInterrupt):
         interrupt()
-    clock[0] += cli.CLEANING / 2
+    clock[0] += cli.GRACE / 2
     interrupt()
-    clock[0] += cli.CLEANING
+    clock[0] += cli.GRACE
     with pytest.raises(KeyboardInterrupt):
         interrupt()
 
@@ -284,8 +295,8 @@ def test_what_is_fresh_is_not_run(project: Path) -> None:
     """A second run says in under 3 s that there is nothing to do, and loads nothing slow."""
     assert replicate("run").exit_code == 0
     code = (
-        "import sys; from pathlib import Path; from replication import cli, paths\n"
-        f"paths.PROJECT = Path({str(project)!r}); cli.app(['run'], standalone_mode=False)\n"
+        "import sys; from pathlib import Path; from replication import cli, files\n"
+        f"files.PROJECT = Path({str(project)!r}); cli.app(['run'], standalone_mode=False)\n"
         "print(sorted({'papermill', 'nbformat', 'jsonschema', 'matplotlib'} & set(sys.modules)))"
     )
     began = time.monotonic()
@@ -296,6 +307,69 @@ def test_what_is_fresh_is_not_run(project: Path) -> None:
     assert "outputs (0 new): " in done.stdout
     assert lines[-1] == "[]"
     assert "toy: running" in replicate("run", "--force").stdout
+
+
+def test_check_answers_by_its_exit_code(project: Path) -> None:
+    """With --check other bytes than before are an error that names the files; all is published."""
+    assert replicate("run", "--check").exit_code == 0
+    assert replicate("run", "--check", "--force").exit_code == 0
+    path = project / "notebooks" / "toy.ipynb"
+    path.write_text(path.read_text().replace("| {trials}", "| so {trials}"))
+    result = replicate("run", "--check")
+    assert result.exit_code == 1
+    folder = project / "figures" / "toy"
+    names = f"{folder / 'notebook.ipynb'}, {folder / 'seen.md'}"  # the cell shows how long it is
+    assert result.stderr == f"error: other bytes than published before: {names}\n"
+    assert (folder / "seen.md").read_text().startswith("| so ")
+    assert replicate("run", "--check").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("module", "old", "new", "message"),
+    [
+        (claims, 'statistic = "sd-ratio"', 'statistic = "sd-rato"', "claim STEADIER.statistic"),
+        (claims, "soccer = 60", "soccer = 0", "judging.trials.soccer: Input should be greater"),
+        (specifications, "trials = 10", "trials = 0", "mazes.factorial.trials: Input should be"),
+        (specifications, '["hit", "detour", "op', '["lob", "detour", "op', "soccer.single: "),
+        (specifications, '"far-detour", "opposite"', '"overspeed"', "mazes.single: task open-maze"),
+    ],
+)
+def test_bad_plans_are_refused_before_any_notebook_runs(
+    monkeypatch: pytest.MonkeyPatch, module: Any, old: str, new: str, message: str
+) -> None:
+    """A mistake in the claims or specifications is found by the check of the file."""
+    name = module.__name__.rpartition(".")[2]
+    text = module._text()
+    assert old in text
+    monkeypatch.setattr(module, "_text", lambda: text.replace(old, new, 1))
+    cached = claims.load_claims if module is claims else specifications.load_specifications
+    cached.cache_clear()
+    try:
+        with pytest.raises(UserError, match=f"^{name}.toml, {message}"):
+            cli.CHECKS[f"replication/evidence/{name}.toml"]()
+    finally:
+        cached.cache_clear()
+
+
+def test_every_check_is_of_a_file() -> None:
+    """The files that are checked are there, and are inputs of notebooks."""
+    for name in cli.CHECKS:
+        assert (files.PROJECT / name).exists()
+
+
+def test_missing_kind_comes_with_a_way_out(project: Path, demo_file: Path) -> None:
+    """The option that takes the kinds of a file is shown, beside the choices that were made."""
+    path = project / "notebooks" / "toy.ipynb"
+    node = nbformat.read(path, as_version=4)
+    node.cells[0].source += "\nchoices = {}"
+    code = f"from replication import load_demos\nload_demos({str(demo_file)!r}).select('late')"
+    node.cells[1].source = code
+    nbformat.write(node, path)
+    for words, shown in (
+        ([], '{"incorrect": "all"}'),
+        (["-p", "choices", '{"alpha": 0.1}'], '{"alpha": 0.1, "incorrect": "all"}'),
+    ):
+        assert refused_late("run", *words).endswith(f", such as -p choices '{shown}'\n")
 
 
 # --- status, verify and clean ----------------------------------------------------------------
@@ -310,7 +384,7 @@ def test_status_leads_from_missing_to_fresh(project: Path) -> None:
     shown = replicate("status").stdout
     assert re.match(r"toy: fresh \(\d+ s, just now\)\n    fresh    seen \.md\n", shown)
     assert "toy: missing" in replicate("status", "--profile", "quick").stdout
-    (project / "figures" / "seen.md").write_text("mine")
+    (project / "figures" / "toy" / "seen.md").write_text("mine")
     shown = replicate("status").stdout
     assert "toy: stale" in shown
     assert "because seen.md is changed" in shown
@@ -328,22 +402,21 @@ def test_the_recommended_command_works(
     assert last == f"everything is fresh; {shlex.join(['replicate', 'verify', *words])} proves it"
 
 
-def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verify_answers_by_its_exit_code(project: Path) -> None:
     """Everything that is wrong has a line on stderr, and any of it makes the code 1."""
-    monkeypatch.setattr("replication.pipeline.verify.PROJECT", project)
     result = replicate("verify")
     assert result.exit_code == 1
-    assert "provenance.json is missing" in result.stderr
+    assert "nothing can be proved" in result.stderr
     assert replicate("run").exit_code == 0
     result = replicate("verify")
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout.endswith("everything agrees\n")
-    (project / "figures" / "seen.md").write_text("mine")
+    (project / "figures" / "toy" / "seen.md").write_text("mine")
     (project / "environment.lock").write_text("numpy==0.1\n")
     result = replicate("verify")
     assert result.exit_code == 1
     first, second, third = result.stderr.splitlines()
-    assert first == "error: seen.md is changed since toy made it"
+    assert first == "error: toy/seen.md is changed since its run"
     assert second == "error: toy is stale: environment.lock has changed"
     assert third.startswith("error: numpy ")
     assert result.stdout.endswith("3 things do not agree\n")
@@ -352,15 +425,15 @@ def test_verify_answers_by_its_exit_code(project: Path, monkeypatch: pytest.Monk
 def test_clean_removes_what_no_notebook_declares(project: Path) -> None:
     """The command does what it says, and says only what it would do if it is asked to."""
     assert replicate("run").exit_code == 0
-    (project / "figures" / "old.png").touch()
-    before = sorted((project / "figures").iterdir())
+    (project / "figures" / "toy" / "old.png").touch()
+    before = sorted((project / "figures").rglob("*"))
     shown = replicate("clean", "--dry-run").stdout
-    assert shown == "would remove old.png\n"
-    assert sorted((project / "figures").iterdir()) == before
-    assert replicate("clean").stdout == "removed old.png\n"
-    assert sorted((project / "figures").iterdir()) == [p for p in before if p.name != "old.png"]
+    assert shown == "would remove toy/old.png\n"
+    assert sorted((project / "figures").rglob("*")) == before
+    assert replicate("clean").stdout == "removed toy/old.png\n"
+    assert sorted((project / "figures").rglob("*")) == [p for p in before if p.name != "old.png"]
     assert replicate("clean").stdout == ""
-    assert "has no provenance.json" in refused("clean", "--out", project)
+    assert "has no folder with a provenance.json" in refused("clean", "--out", project)
     assert "toy: fresh" in replicate("status").stdout
 
 
@@ -499,6 +572,32 @@ def test_choices_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "(did you mean 'ALPHA'?)" in refused("choices", "alpa")
 
 
+# --- draw ------------------------------------------------------------------------------------
+
+
+def test_draw_uses_the_code_of_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drawing function gets the table as it is read back; other code is not called."""
+    (tmp_path / "fig.csv").write_text("x,y\n1,2\n3,1\n")
+
+    def drawing(numbers: pd.DataFrame) -> Figure:
+        figure = Figure()
+        figure.subplots().plot(numbers["x"], numbers["y"])
+        return figure
+
+    monkeypatch.setattr("replication.report.style.drawing", drawing, raising=False)
+    pictures = cli._drawn("replication.report.style.drawing", tmp_path / "fig.csv")
+    assert pictures.keys() == {".png", ".svg"}
+    assert pictures[".png"].startswith(b"\x89PNG")
+    with pytest.raises(UserError, match="only functions of the package"):
+        cli._drawn("os.system", tmp_path / "fig.csv")
+
+
+def test_draw_without_outputs_draws_nothing(project: Path) -> None:
+    """Where nothing is published there is no figure."""
+    assert replicate("draw").stdout == "0 figures drawn; the others have the same bytes\n"
+    assert "unknown figure 'fig05'" in refused("draw", "fig05")
+
+
 # --- the rest --------------------------------------------------------------------------------
 
 
@@ -519,6 +618,14 @@ def test_faults_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPa
         result = replicate("demos", "schema")
         assert result.exit_code == code
         assert ("error: mine" in result.stderr) == (code == 2)
+
+
+def test_misuse_is_one_line() -> None:
+    """An unknown option or command, and a value that cannot be, have one line and a way on."""
+    assert "No such option '--jbs'" in refused("run", "--jbs", "2")
+    assert "see replicate run --help" in refused("run", "--jobs", "0")
+    assert "No such command 'rum'" in refused("rum")
+    assert replicate("run", "-h").stdout == replicate("run", "--help").stdout
 
 
 def test_help_loads_nothing_heavy() -> None:

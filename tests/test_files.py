@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from replication.files import write_file
+from replication import files
+from replication.files import shown_as, write_file
 
 
 @pytest.mark.parametrize(
@@ -92,3 +93,12 @@ def test_a_reader_never_sees_half_a_file(tmp_path: Path) -> None:
         writer.join()
     assert seen | {target.read_text()} <= contents
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_paths_are_shown_from_the_project_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the project is, or another folder, is not shown."""
+    monkeypatch.setattr(files, "PROJECT", tmp_path / "project")
+    assert shown_as(tmp_path / "project" / "build" / "quick") == "build/quick"
+    assert shown_as(tmp_path / "project" / ".." / "elsewhere") == "elsewhere"

@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-import importlib
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -32,27 +31,25 @@ def four() -> int:
 
 
 @pytest.fixture
-def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
     """Return a function that edits a toy package and returns the hash of its top module."""
     folder = tmp_path / "toy"
     folder.mkdir()
     for name, text in MODULES.items():
         (folder / f"{name}.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(source, "PACKAGE", "toy")
+    monkeypatch.setattr(source, "FOLDER", folder)
+    source._read.cache_clear()
 
     def hashed(name: str = "top", old: str = "", new: str = "") -> str:
         text = MODULES[name]
         assert old in text
         (folder / f"{name}.py").write_text(text.replace(old, new) if old else text)
-        importlib.invalidate_caches()
         found = source.source_hash.__wrapped__("toy.top")
         (folder / f"{name}.py").write_text(text)
         return found
 
-    yield hashed
-    for name in [name for name in sys.modules if name.split(".")[0] == "toy"]:
-        del sys.modules[name]
+    return hashed
 
 
 @pytest.mark.parametrize(
@@ -130,41 +127,41 @@ def test_bare_source_has_no_prose(text: str, bare: str) -> None:
     assert source.bare_source(text) == bare
 
 
+KEY = (
+    *("replication.trials.compute", "replication.trials.maze_agent"),
+    *("replication.irl.unified", "replication.irl.adaboost"),
+)
+"""What the keys of trials in a maze hash, together with what these modules import."""
+
+
 @pytest.fixture
-def hashed_files(monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """Return the names of the modules that are read for the hash of `replication.trials.compute`."""
-    read: set[str] = set()
-    whole = Path.read_bytes
-
-    def noted(self: Path) -> bytes:
-        read.add(self.relative_to(PROJECT).with_suffix("").as_posix().replace("/", "."))
-        return whole(self)
-
-    monkeypatch.setattr(Path, "read_bytes", noted)
-    source.source_hash.__wrapped__("replication.trials.compute")
-    return read
+def hashed() -> set[str]:
+    """Return the names of the modules that are read for the hash of a trial in a maze."""
+    return set(source._closure(KEY, without=source.SILENT))
 
 
-def test_drawing_and_reporting_do_not_count(hashed_files: set[str]) -> None:
+def test_drawing_and_reporting_do_not_count(hashed: set[str]) -> None:
     """A trial's hash covers what computes it, and neither figures nor tables nor the program."""
-    for name in ("compute", "setting", "qlearning", "expectations", "irl.loop", "irl.unified"):
-        assert f"replication.{name}" in hashed_files
-    for name in (
-        *("figures", "panels", "tables", "outputs", "statistics", "regenerate", "cli"),
-        *("trials", "store", "progress", "execution", "provenance"),
-    ):
-        assert (PROJECT / "replication" / f"{name}.py").exists()
-        assert f"replication.{name}" not in hashed_files
+    for name in ("trials.condition", "learning.qlearning", "irl.expectations", "irl.loop"):
+        assert f"replication.{name}" in hashed
+    for name in ("report", "evidence", "pipeline", "site", "envs.soccer.world", "demos.files"):
+        assert (PROJECT / "replication" / name.replace(".", "/")).exists() or "." in name
+        assert not [module for module in hashed if module.startswith(f"replication.{name}")]
+    for name in ("cli", "progress", "errors", "trials.store", "trials.run"):
+        assert (PROJECT / "replication" / f"{name.replace('.', '/')}.py").exists()
+        assert f"replication.{name}" not in hashed
 
 
-def test_hash_covers_all_that_python_loads(hashed_files: set[str]) -> None:
-    """Each module of the package that Python loads for `replication.trials.compute` is in the hash."""
+def test_hash_covers_all_that_python_loads(hashed: set[str]) -> None:
+    """Each module of the package that Python loads for a trial is in the hash, or is silent."""
     program = f"""
 import sys
+from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 spec = spec_from_file_location("replication", {str(PROJECT / "replication" / "__init__.py")!r})
 sys.modules["replication"] = module_from_spec(spec)  # its own imports are not executed
-import replication.compute
+for name in {KEY!r}:
+    import_module(name)
 loaded = [name for name in sys.modules if name.startswith("replication.")]
 print(*(name for name in loaded if not hasattr(sys.modules[name], "__path__")))
 """
@@ -173,7 +170,31 @@ print(*(name for name in loaded if not hasattr(sys.modules[name], "__path__")))
     )
     loaded = set(done.stdout.split())
     assert "replication.irl.loop" in loaded
-    assert loaded <= hashed_files
+    assert loaded - source.SILENT <= hashed
+
+
+def test_modules_that_are_named_in_a_text_count(toy: Callable[..., str], tmp_path: Path) -> None:
+    """Outputs depend on modules that are imported by name; a trial's key names its own."""
+    (tmp_path / "toy" / "late.py").write_text(
+        "from importlib import import_module\nM = 'toy.other'"
+    )
+    assert set(source.module_hashes(["toy.late"])) == {"toy.late", "toy.other"}
+    assert set(source._closure(["toy.late"])) == {"toy.late"}
+
+
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        ("import toy.top, numpy", ["toy.top"]),
+        ("from toy import top", ["toy.top"]),
+        ("from toy import four", ["toy"]),
+        ("%time\n!ls\nfrom toy.bottom import FACTOR", ["toy.bottom"]),
+        ("from toy.bottom import (", []),
+    ],
+)
+def test_imports_of_a_cell(toy: Callable[..., str], code: str, names: list[str]) -> None:
+    """Modules of the package count; the package itself where a name of its own is imported."""
+    assert source.imports_of(code) == names
 
 
 def test_no_module_hides_its_imports() -> None:

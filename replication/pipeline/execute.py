@@ -1,47 +1,34 @@
-"""Execute one notebook through papermill, in a kernel of our own.
+"""Execute one notebook through papermill, in a process and a kernel of its own.
 
-The kernel is always the interpreter that runs this, whatever kernels are installed; it is free of
-the user's start-up files. The executed notebook has no times, no paths of this machine and the same
-cell ids in every run.
+The kernel is always the interpreter that runs this, whatever kernels are installed, and it is free
+of the user's start-up files. Whoever is interrupted kills the process and all that it has started.
 """
 
 from __future__ import annotations
 
 import json
-import logging
 import os
-import shlex
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import nbformat
-import papermill
-from nbclient.exceptions import CellTimeoutError, DeadKernelError
-from nbformat.reader import NotJSONError
-from papermill.exceptions import PapermillExecutionError
+import psutil
 
-from replication import files
+from replication.errors import UserError
 from replication.files import write_file
-from replication.pipeline.engine import ENGINE
 from replication.pipeline.notebook import Notebook, RunError, first_line, refuse
-from replication.pipeline.provenance import NEUTRAL
-from replication.pipeline.rendering import drop_empty_tags
-from replication.progress import EVENTS, Display
-
-STARTS = 3
-"""Attempts at starting a kernel: now and then another program takes its port."""
+from replication.pipeline.rendering import as_text, clean, link_players, read_executed
+from replication.progress import EVENTS, SCHEDULER, Display
 
 KERNEL = "replication"
 
-MISTAKES = frozenset({"ChoiceError", "ClaimError", "DemoError", "MazeError"})
-"""What a cell raises when the user's parameters or files are at fault, not the notebook."""
-
-# What papermill logs of a failure is said again, and better, by the error that is raised.
-logging.getLogger("papermill").addHandler(logging.NullHandler())
+TICK = 0.05
+"""Seconds between two looks at a notebook that is running."""
 
 
 def execute(
@@ -49,13 +36,13 @@ def execute(
     values: Mapping[str, Any],
     stage: Path,
     *,
-    target: Path,
-    executed: Path,
+    folders: Mapping[Path, Path],
+    failed: Path,
     timeout: int,
     display: Display,
     scheduler: str = "",
-) -> None:
-    """Execute a notebook; what it writes goes into the folder `stage`.
+) -> str:
+    """Execute a notebook, which writes into `stage`; return the executed one as it is published.
 
     Parameters
     ----------
@@ -63,10 +50,10 @@ def execute(
         What to run, and parameters that differ from its literals.
     stage
         Takes the place of the parameter `out`.
-    target
-        Where the outputs will be published; the executed notebook names it instead of the stage.
-    executed
-        The executed notebook's file, which is written after a failure, too.
+    folders
+        Folders of this machine, and those that the executed notebook names instead.
+    failed
+        File for the notebook if it fails.
     timeout
         Seconds that one cell may take.
     display
@@ -76,157 +63,149 @@ def execute(
 
     Raises
     ------
-    NotebookError
+    UserError
         If a cell refuses a choice, a map or demonstrations.
     RunError
         If a cell failed, took too long or killed its kernel.
     """
-    # A kernel that is being killed may still write there.
-    with tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch:
-        draft, events = (
-            Path(scratch) / f"{notebook.name}.ipynb",
-            Path(scratch) / "events",
-        )
-        environment = {EVENTS: str(events)}
-        if scheduler:  # otherwise that of the user's own environment, if any
-            environment["REPLICATION_SCHEDULER"] = scheduler
+    with tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as name:
+        scratch = Path(name).resolve()
+        draft = scratch / f"{notebook.name}.ipynb"
+        given = {**values, "out": str(stage)}
+        options = {
+            "parent": os.getpid(),
+            "input_path": _literally(scratch / "source.ipynb"),
+            "output_path": _literally(draft),
+            "parameters": {k: given[k] for k in notebook.literals if k in given},
+            "kernel_name": KERNEL,
+            "language": "python",
+            "execution_timeout": timeout,
+        }
+        write_file(scratch / "source.ipynb", as_text(notebook.load()))
+        write_file(scratch / "options.json", json.dumps(options))
+        _drive(scratch, _environment(scratch, scheduler), display)
         try:
-            with display.listen(events), _private_kernel(Path(scratch), environment):
-                given = {**values, "out": str(stage)}
-                ordered = {name: given[name] for name in notebook.literals if name in given}
-                _execute(notebook, ordered, draft, timeout)
-        except BaseException:
-            # The disk may be full: then the failure itself counts, not that it cannot be shown.
-            with suppress(OSError, NotJSONError):
-                write_file(executed, _clean(notebook, draft, stage, target))
+            node = read_executed(draft, folders)
+        except (OSError, ValueError):  # it was not begun, or cut off
+            node = None
+        try:
+            _raise_faults(notebook, node, scratch, timeout)
+        except (UserError, RunError):
+            if node is not None:
+                clean(notebook, node)
+                with suppress(OSError):  # on a full disk the failure itself counts
+                    write_file(failed, as_text(node))
             raise
-        try:
-            write_file(executed, _clean(notebook, draft, stage, target))
-        except OSError as error:
-            raise RunError(f"{executed}: cannot be written: {first_line(error)}") from error
+        clean(notebook, node)
+        link_players(node)
+        return as_text(node)
 
 
-@contextmanager
-def _private_kernel(scratch: Path, environment: Mapping[str, str]) -> Iterator[None]:
-    """Make the running interpreter the kernel, free of the user's own start-up files."""
+def _environment(scratch: Path, scheduler: str) -> dict[str, str]:
+    """Return the environment of a run, in which the only kernel is this interpreter."""
     spec = {
-        # its own warnings (that local sockets are not encrypted) are no concern of the user
+        # its own warnings (that local sockets are not encrypted) do not concern the user
         "argv": [
             *(sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"),
             "--log-level=ERROR",
         ],
         "display_name": KERNEL,
         "language": "python",
-        "env": {
-            "IPYTHONDIR": str(scratch / "ipython"),
-            "PYTHONSTARTUP": "",
-            "PYTHONHASHSEED": "0",  # sets keep their order from run to run
-            **environment,
-        },
     }
     write_file(scratch / "jupyter" / "kernels" / KERNEL / "kernel.json", json.dumps(spec))
-    changed = {
-        "JUPYTER_PATH": os.pathsep.join(
-            filter(None, (str(scratch / "jupyter"), os.environ.get("JUPYTER_PATH")))
-        ),
+    (scratch / "tmp").mkdir()
+    path = (str(scratch / "jupyter"), os.environ.get("JUPYTER_PATH"))
+    return {
+        **os.environ,
+        "JUPYTER_PATH": os.pathsep.join(filter(None, path)),
         "JUPYTER_RUNTIME_DIR": str(scratch / "runtime"),
+        "IPYTHONDIR": str(scratch / "ipython"),
+        "TMPDIR": str(scratch / "tmp"),  # what a killed kernel leaves goes with the folder
+        "PYTHONSTARTUP": "",
+        "PYTHONHASHSEED": "0",  # sets keep their order from run to run
+        EVENTS: str(scratch / "events"),
+        **({SCHEDULER: scheduler} if scheduler else {}),
     }
-    before = {name: os.environ.get(name) for name in changed}
-    os.environ.update(changed)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
-def _execute(notebook: Notebook, values: Mapping[str, Any], draft: Path, timeout: int) -> None:
-    """Execute into the file `draft`, which is there after a failure too."""
-    begun: list[int] = []
+def _drive(scratch: Path, environment: Mapping[str, str], display: Display) -> None:
+    """Run the driver to its end; if this is interrupted, kill it and all that it has started."""
+    command = [sys.executable, "-m", "replication.pipeline.driver", str(scratch)]
+    with (scratch / "log").open("wb") as log:
+        driver = subprocess.Popen(
+            command,
+            env=dict(environment),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            process_group=0,  # Ctrl-C on a terminal is for this process alone
+        )
+        try:
+            while driver.poll() is None:
+                display.poll(Path(environment[EVENTS]))
+                time.sleep(TICK)
+            display.poll(Path(environment[EVENTS]))
+        finally:
+            _kill(driver)
+    if driver.returncode and not (scratch / "fault.json").exists():
+        lines = (scratch / "log").read_text(encoding="utf-8", errors="replace").splitlines()
+        killed = "it was killed, perhaps for want of memory"
+        fault = {"cell": None, "kind": "driver", "message": (lines or [killed])[-1]}
+        write_file(scratch / "fault.json", json.dumps(fault))
 
-    def begin(cell: Any, cell_index: int) -> None:
-        begun.append(cell_index)
+
+def _kill(driver: subprocess.Popen[bytes]) -> None:
+    """Kill a process and its descendants; it is stopped first, so that it starts no more."""
+    if driver.poll() is not None:
+        return
+    with suppress(psutil.NoSuchProcess):
+        root = psutil.Process(driver.pid)
+        root.suspend()
+        while root.status() not in (psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE):
+            time.sleep(0.001)
+        family = [*root.children(recursive=True), root]
+        for process in family:
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+        psutil.wait_procs(family[:-1], timeout=10)
+    driver.wait()
+
+
+def _raise_faults(notebook: Notebook, node: Any, scratch: Path, timeout: int) -> None:
+    """Raise what went wrong: what a cell raised stands in the executed notebook."""
 
     def place(at: int) -> str:
         # papermill puts its own cell behind the parameters cell
         return f"{notebook.path}: cell {at + 1 - (at > notebook.at)}"
 
-    for attempt in range(1, STARTS + 1):
-        try:
-            node = papermill.execute_notebook(
-                notebook.load(),
-                str(draft).replace("{", "{{").replace("}", "}}"),  # papermill fills these in
-                parameters=dict(values),
-                engine_name=ENGINE,
-                kernel_name=KERNEL,
-                language="python",
-                progress_bar=False,
-                execution_timeout=timeout,
-                iopub_timeout=60,
-                shutdown_kernel="immediate",
-                record_timing=False,
-                coalesce_streams=True,  # where a stream is cut depends on the time
-                on_cell_execute=begin,
+    if (scratch / "fault.json").exists():
+        fault = json.loads((scratch / "fault.json").read_text(encoding="utf-8"))
+        if fault["cell"] is None:
+            what = (
+                "its process failed" if fault["kind"] == "driver" else "the kernel does not start"
             )
-        except PapermillExecutionError as error:
-            said = first_line(error.evalue)
-            if error.ename in MISTAKES:
-                refuse(notebook.path, said + _example(notebook, values, said))
-            said = f"{error.ename}: {said}"
-            details = "\n".join(error.traceback)
-            raise RunError(f"{place(error.cell_index)} failed: {said}", details) from None
-        except Exception as error:
-            if not begun:
-                if attempt < STARTS:
-                    continue
-                said = f"the kernel does not start: {first_line(error)}"
-                raise RunError(f"{notebook.path}: {said}") from error
-            if isinstance(error, DeadKernelError):
-                why = "the kernel was killed, perhaps for want of memory; use fewer --jobs"
-                raise RunError(f"{place(begun[-1])}: {why}") from None
-            if isinstance(error, CellTimeoutError):
-                why = f"took more than {timeout} seconds; allow more with --timeout"
-                raise RunError(f"{place(begun[-1])} {why}") from None
-            raise RunError(f"{place(begun[-1])}: {first_line(error)}") from error
-        if node.cells[begun[-1]].metadata.papermill.exception:  # SystemExit, no error to papermill
-            raise RunError(f"{place(begun[-1])} ended the notebook before its last cell")
-        return
+            raise RunError(f"{notebook.path}: {what}: {first_line(fault['message'])}")
+        message = f": {first_line(fault['message'])}"
+        if fault["kind"] == "DeadKernelError":
+            message = ": the kernel was killed, perhaps for want of memory; use fewer --jobs"
+        elif fault["kind"] == "CellTimeoutError":
+            message = f" took more than {timeout} seconds; allow more with --timeout"
+        raise RunError(f"{place(fault['cell'])}{message}")
+    if node is None:
+        raise RunError(f"{notebook.path}: the executed notebook cannot be read")
+    for at, cell in enumerate(node.cells):
+        if not cell.metadata.get("papermill", {}).get("exception"):
+            continue
+        errors = [output for output in cell.outputs if output.output_type == "error"]
+        if not errors or errors[-1].ename == "SystemExit":
+            raise RunError(f"{place(at)} ended the notebook before its last cell")
+        error = errors[-1]
+        if error.traceback == [f"error: {error.evalue}"]:  # see errors.UserError
+            refuse(notebook.path, first_line(error.evalue))
+        message = f"{error.ename}: {first_line(error.evalue)}"
+        raise RunError(f"{place(at)} failed: {message}", "\n".join(error.traceback))
 
 
-def _example(notebook: Notebook, values: Mapping[str, Any], said: str) -> str:
-    """Show how to take the kinds that a file has, if it lacks one that was asked for."""
-    if "has no incorrect demo of kind" not in said or "choices" not in notebook.literals:
-        return ""
-    choices = {**values.get("choices", {}), "incorrect": "all"}
-    return f", such as -p choices {shlex.quote(json.dumps(choices))}"
-
-
-def _clean(notebook: Notebook, draft: Path, stage: Path, target: Path) -> str:
-    """Return the executed notebook without what differs between equal runs."""
-    node = nbformat.read(draft, as_version=4)
-    node.metadata.pop("papermill", None)
-    node.metadata.get("language_info", {}).pop(
-        "version", None
-    )  # the manifest tells it, in two parts
-    known = {cell.get("id") for cell in notebook.load().cells}
-    added = 0
-    for cell in node.cells:
-        cell.metadata.pop("papermill", None)
-        drop_empty_tags(cell)
-        if cell.id not in known:
-            added += 1
-            cell.id = f"papermill-{added}"
-            cell.source = "\n".join(_declared(notebook, line) for line in cell.source.split("\n"))
-    inside = target.resolve().is_relative_to(files.PROJECT)
-    shown = target.resolve().relative_to(files.PROJECT).as_posix() if inside else target.name
-    text = str(nbformat.writes(node))
-    return text.replace(json.dumps(str(stage))[1:-1], json.dumps(shown)[1:-1]) + "\n"
-
-
-def _declared(notebook: Notebook, line: str) -> str:
-    """Return a line of the injected parameters; one that changes no result as it is declared."""
-    name = line.partition(" = ")[0]
-    return f"{name} = {notebook.literals[name]!r}" if name in NEUTRAL - {"out"} else line
+def _literally(path: Path) -> str:
+    """Return a path for papermill, which would fill in what stands in braces."""
+    return str(path).replace("{", "{{").replace("}", "}}")

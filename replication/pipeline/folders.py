@@ -1,49 +1,52 @@
-"""The folders of a run: where outputs, executed notebooks and trials go, for one run at a time."""
+"""The folders of a run: where outputs, failed notebooks and trials go, for one run at a time."""
 
 from __future__ import annotations
 
 import fcntl
 import os
-import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from replication import files
 from replication.pipeline.notebook import refuse
+from replication.pipeline.publish import recover
 
 LOCK = ".lock"
 
-DRAFT = ".draft-"
-"""What the names of folders with half-written files begin with."""
+PAPER = "figures"
+"""The folder of the results of the profile "paper"."""
 
 
 def outputs_folder(name: str) -> Path:
-    """Return where the outputs of a run go unless told otherwise, see :func:`runs.run_name`."""
-    return files.PROJECT / ("figures" if name == "paper" else f"build/{name}")
+    """Return where the outputs of a run go by default, see :func:`plan.run_name`."""
+    return files.PROJECT / (PAPER if name == "paper" else f"build/{name}")
 
 
-def executed_folder(out: Path, name: str) -> Path:
-    """Return where executed notebooks go: below `build`, or beside outputs in another place."""
-    if out.resolve() == outputs_folder(name).resolve():
-        return files.PROJECT / "build" / "executed" / name
-    return out / "executed"
+def failed_notebook(name: str, out: Path) -> Path:
+    """Return where the notebook of a failed run is kept."""
+    return writable(files.PROJECT / "build" / "failed", out / "failed") / f"{name}.ipynb"
 
 
 def store_file(store: str, out: Path) -> Path:
     """Return the store's file: in `out` where the project cannot be written."""
     path = files.resolve(store)
-    folder = path.parent
-    while not folder.exists():
-        folder = folder.parent
-    return path if os.access(folder, os.W_OK) else out.resolve() / path.name
+    return writable(path.parent, out.resolve()) / path.name
+
+
+def writable(folder: Path, otherwise: Path) -> Path:
+    """Return a folder that can be written or made, or another one instead."""
+    there = folder
+    while not there.exists():
+        there = there.parent
+    return folder if os.access(there, os.W_OK) else otherwise
 
 
 @contextmanager
-def exclusive(folders: Sequence[Path], echo: Callable[[str], object]) -> Iterator[bool]:
-    """Keep other runs out of folders, which are made when missing.
+def exclusive(folder: Path, echo: Callable[[str], object]) -> Iterator[bool]:
+    """Keep other runs out of a folder, which is made when missing; wait for one that is there.
 
-    What a killed run left half-written there is removed.
+    What a killed run left there is put right, see :func:`publish.recover`.
 
     Yields
     ------
@@ -53,31 +56,20 @@ def exclusive(folders: Sequence[Path], echo: Callable[[str], object]) -> Iterato
     Raises
     ------
     NotebookError
-        If a folder cannot be used.
+        If the folder cannot be used.
     """
-    with ExitStack() as locks:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / LOCK).open("w")
+    except OSError as error:
+        refuse(folder, f"cannot be used as a folder: {(error.strerror or str(error)).lower()}")
+    with lock:
         waited = False
-        for folder in dict.fromkeys(folders):
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-                waited |= locks.enter_context(_locked(folder, echo))
-                for draft in folder.glob(f"{DRAFT}*"):
-                    shutil.rmtree(draft)
-            except OSError as error:
-                said = (error.strerror or str(error)).lower()
-                refuse(folder, f"cannot be used as a folder: {said}")
-        yield waited
-
-
-@contextmanager
-def _locked(folder: Path, echo: Callable[[str], object]) -> Iterator[bool]:
-    """Keep other runs out of a folder; wait for one that is there, and yield whether one was."""
-    with (folder / LOCK).open("w") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            waited = False
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             echo(f"another run writes to {folder}: waiting until it ends")
-            fcntl.flock(file, fcntl.LOCK_EX)
+            fcntl.flock(lock, fcntl.LOCK_EX)
             waited = True
+        recover(folder)
         yield waited

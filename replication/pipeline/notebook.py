@@ -1,21 +1,21 @@
-"""What a notebook declares: its parameters, what a run writes, and its profiles.
+"""What a notebook declares: its parameters, what a run publishes, what it reads, and its profiles.
 
-A notebook has one cell tagged `parameters`, which holds literals only, and says in its metadata
-what a run writes into the folder `out`, one of the parameters::
+A notebook has one cell tagged `parameters`, which holds literals only; `out`, the folder that it
+writes to, is one of them. Its metadata declare what it writes there::
 
     {
         "replication": {
-            "outputs": ["fig04.png"],
-            "merged": ["trials.csv"],
-            "inputs": ["replication/choices.toml"],
+            "figures": ["fig05"],
+            "tables": ["table1"],
+            "players": ["player"],
+            "data": ["trials.csv"],
+            "needs": [],
+            "inputs": ["replication/paper/choices.toml"],
             "profiles": {"quick": {"trials": 6}, "paper": {"trials": 100}},
         }
     }
 
-`inputs` are files of the project that the notebook reads without having them as parameters.
-`merged` outputs hold rows of several notebooks: the published file is there when the notebook
-starts, and the notebook replaces its own rows. A profile is a set of parameter values; under a
-profile that it does not name, a notebook keeps the literals of its parameters cell.
+See :class:`Declaration` for each of them.
 """
 
 from __future__ import annotations
@@ -28,12 +28,27 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from replication.errors import UserError, unknown
 
+EXECUTED = "notebook.ipynb"
+"""The executed notebook, in the folder of its outputs."""
+
+MANIFEST = "provenance.json"
+"""What the outputs came from, in the same folder."""
+
 INJECTED = "injected-parameters"
 """The tag that papermill gives to its own cell."""
+
+SUFFIXES = {
+    "figures": (".csv", ".png", ".svg"),
+    "tables": (".csv", ".md"),
+    "players": (".csv", ".html"),
+    "data": ("",),
+}
 
 
 class NotebookError(UserError):
@@ -46,6 +61,59 @@ class RunError(RuntimeError):
     def __init__(self, message: str, details: str = "") -> None:
         super().__init__(message)
         self.details = details
+
+
+def _plain(names: tuple[str, ...]) -> tuple[str, ...]:
+    for name in names:
+        if not re.fullmatch(r"\w[\w.-]*", name):
+            raise ValueError(f"{name!r} is not a plain name without a folder")
+        if name in (EXECUTED, MANIFEST):
+            raise ValueError(f"{name!r} is written by every run")
+        if names.count(name) > 1:
+            raise ValueError(f"{name!r} stands there twice")
+    return names
+
+
+Names = Annotated[tuple[str, ...], AfterValidator(_plain)]
+
+
+class Declaration(BaseModel):
+    """The metadata `replication` of a notebook.
+
+    Attributes
+    ----------
+    figures, tables, players
+        Outputs by their names without suffix: a figure is NAME.png, NAME.svg and its numbers
+        NAME.csv, a table NAME.md and NAME.csv, a player NAME.html and NAME.csv.
+    data
+        Other files that it writes.
+    needs
+        Notebooks whose published folders it reads, from the folder in its parameter `results`.
+    inputs
+        Files of the project that it reads without having them as parameters.
+    profiles
+        Parameter values by the name of the profile; a profile that is not among them keeps the
+        literals of the parameters cell.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    figures: Names = ()
+    tables: Names = ()
+    players: Names = ()
+    data: Names = ()
+    needs: Names = ()
+    inputs: tuple[str, ...] = ()
+    profiles: dict[str, dict[str, Any]] = {}
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of all files."""
+        groups = ((getattr(self, kind), suffixes) for kind, suffixes in SUFFIXES.items())
+        names = [
+            stem + suffix for stems, suffixes in groups for stem in stems for suffix in suffixes
+        ]
+        return tuple(dict.fromkeys(names))
 
 
 @dataclass(frozen=True)
@@ -71,12 +139,8 @@ class Notebook:
         Index of the parameters cell.
     literals
         The parameters and their values, from the parameters cell.
-    outputs, merged
-        Files that a run writes; those of them that it shares with other notebooks.
-    inputs
-        Files that it reads, from the project's folder on.
-    profiles
-        Parameter values by the name of the profile.
+    declared
+        What it declares.
     """
 
     path: Path
@@ -84,25 +148,17 @@ class Notebook:
     cells: tuple[Cell, ...]
     at: int
     literals: Mapping[str, Any]
-    outputs: tuple[str, ...]
-    merged: tuple[str, ...]
-    inputs: tuple[str, ...]
-    profiles: Mapping[str, Mapping[str, Any]]
+    declared: Declaration
 
     @property
     def name(self) -> str:
-        """The file's name without its suffix."""
+        """The file's name without its suffix: also that of the folder of its outputs."""
         return self.path.stem
 
     @property
-    def executed(self) -> str:
-        """Name of the executed notebook's file, wherever it is written."""
-        return f"{self.name}.ipynb"
-
-    @property
     def published(self) -> tuple[str, ...]:
-        """All files that a run publishes: the outputs, and the executed notebook."""
-        return (*self.outputs, self.executed)
+        """All files that a run publishes but for the manifest."""
+        return (*self.declared.outputs, EXECUTED)
 
     def load(self) -> Any:
         """Return the contents as nbformat has them.
@@ -123,9 +179,9 @@ class Notebook:
             refuse(self.path, f"is not a valid notebook: {first_line(error)}")
         return node
 
-    def is_shown_by(self, executed: Path) -> bool:
-        """Return whether an executed notebook has the same text and code as this one."""
-        _, cells = _parsed(executed.read_text(encoding="utf-8"))
+    def shows(self, executed: str) -> bool:
+        """Return whether the text of an executed notebook's file has this text and code."""
+        _, cells = _parsed(executed)
         shown = [cell.source for cell in cells if INJECTED not in cell.tags]
         return shown == [cell.source for cell in self.cells]
 
@@ -142,11 +198,9 @@ class Notebook:
                 refuse(self.path, unknown(name, self.literals, "parameter"))
             literal = self.literals[name]
             if not _is_json(value) or not _same_type(value, literal):
-                wanted = f"{_kind(literal)}, such as {json.dumps(literal)}"
-                refuse(
-                    self.path,
-                    f"parameter {name!r} is {wanted}; {value!r} is {_kind(value)}",
-                )
+                expected = f"{_kind(literal)}, such as {json.dumps(literal)}"
+                message = f"parameter {name!r} is {expected}; {value!r} is {_kind(value)}"
+                refuse(self.path, message)
 
 
 def read_notebook(path: Path) -> Notebook:
@@ -165,41 +219,21 @@ def read_notebook(path: Path) -> Notebook:
         refuse(path, f"cannot be read: {(error.strerror or str(error)).lower()}")
     except Exception as error:  # whatever the contents make the reader raise
         refuse(path, f"is not a valid notebook: {first_line(error)}")
-
     tagged = [
         at for at, cell in enumerate(cells) if cell.kind == "code" and "parameters" in cell.tags
     ]
     if len(tagged) != 1:
-        refuse(
-            path,
-            f"{len(tagged)} cells have the tag 'parameters'; exactly one must have it",
-        )
+        refuse(path, f"{len(tagged)} cells have the tag 'parameters'; exactly one must have it")
     literals = _literals(path, cells[tagged[0]].source)
+    declared = _declared(path, metadata.get("replication"))
     if not isinstance(literals.get("out"), str):
         refuse(path, "the parameters cell must have out = 'FOLDER', where the outputs go")
-
-    declared = metadata.get("replication")
-    if not isinstance(declared, dict) or "outputs" not in declared:
-        refuse(path, 'its metadata do not declare {"replication": {"outputs": [...]}}')
-    for key in declared:
-        known = ["outputs", "merged", "inputs", "profiles"]
-        if key not in known:
-            refuse(path, unknown(key, known, "declaration"))
-    outputs = _file_names(path, "outputs", declared["outputs"])
-    merged = _file_names(path, "merged", declared.get("merged", []))
-    profiles = declared.get("profiles", {})
-    if not isinstance(profiles, dict) or not all(isinstance(p, dict) for p in profiles.values()):
-        refuse(path, "'profiles' must hold an object of parameter values for each profile")
-    inputs = declared.get("inputs", [])
-    if not isinstance(inputs, list) or not all(isinstance(name, str) for name in inputs):
-        refuse(path, "'inputs' must be a list of files")
-    every = tuple(dict.fromkeys((*outputs, *merged)))
-    notebook = Notebook(
-        path, text, cells, tagged[0], literals, every, merged, tuple(inputs), profiles
-    )
-    for profile, values in profiles.items():
-        if "out" in values:
-            refuse(path, f"profile {profile!r} sets 'out', which each run chooses")
+    if declared.needs and not isinstance(literals.get("results"), str):
+        refuse(path, "the parameters cell must have results = 'FOLDER', where what it needs is")
+    notebook = Notebook(path, text, cells, tagged[0], literals, declared)
+    for profile, values in declared.profiles.items():
+        for name in {"out", "results"} & values.keys():
+            refuse(path, f"profile {profile!r} sets {name!r}, which each run chooses")
         notebook.check(values)
     return notebook
 
@@ -220,52 +254,50 @@ def _parsed(text: str) -> tuple[dict[str, Any], tuple[Cell, ...]]:
     return dict(document["metadata"]), tuple(cells)
 
 
+def _declared(path: Path, metadata: Any) -> Declaration:
+    """Check the declaration; what is wrong is told in one line."""
+    if not isinstance(metadata, dict):
+        refuse(path, 'its metadata do not declare {"replication": {"figures": [...]}}')
+    try:
+        return Declaration.model_validate(metadata)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        if first["type"] == "extra_forbidden":
+            refuse(path, unknown(place, Declaration.model_fields, "declaration"))
+        message = first["msg"].removeprefix("Value error, ")
+        refuse(path, f"declaration {place!r}: {message}")
+
+
 def _literals(path: Path, source: str) -> dict[str, Any]:
     try:
         statements = ast.parse(source).body
     except (SyntaxError, ValueError) as error:
         line = getattr(error, "lineno", 1)
-        refuse(
-            path,
-            f"line {line} of the parameters cell is not Python: {first_line(error)}",
-        )
+        refuse(path, f"line {line} of the parameters cell is not Python: {first_line(error)}")
     literals: dict[str, Any] = {}
     for statement in statements:
-        line = statement.lineno
-        text = source.splitlines()[line - 1].strip()
-        name, value = "", None
+        text = source.splitlines()[statement.lineno - 1].strip()
+        place = f"line {statement.lineno} of the parameters cell, `{text}`"
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=node):
+                pass
+            case _:
+                name, node = "", ast.Constant(None)
         try:
-            if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-                name, value = statement.targets[0].id, ast.literal_eval(statement.value)
+            value = ast.literal_eval(node)
         except (TypeError, ValueError, RecursionError, MemoryError):
-            name = ""
-        if not name or len(statement.targets) > 1:  # type: ignore[attr-defined]
-            mend = "only `name = literal` may stand there; move it to the next cell"
-            refuse(path, f"line {line} of the parameters cell, `{text}`: {mend}")
+            name, value = "", None
+        if not name:
+            only = "only `name = literal` is allowed here; move other code to the next cell"
+            refuse(path, f"{place}: {only}")
         if not _is_json(value):
-            mend = "a parameter must be a JSON value: null, true, a number, text, a list, an object"
-            refuse(path, f"line {line} of the parameters cell, `{text}`: {mend}")
+            kinds = "null, true, a number, text, a list, an object"
+            refuse(path, f"{place}: a parameter must be a JSON value: {kinds}")
         if name in literals:
-            refuse(
-                path,
-                f"line {line} of the parameters cell, `{text}`: {name!r} is there twice",
-            )
+            refuse(path, f"{place}: {name!r} is there twice")
         literals[name] = value
     return literals
-
-
-def _file_names(path: Path, key: str, names: Any) -> tuple[str, ...]:
-    if not isinstance(names, list):
-        refuse(path, f"{key!r} must be a list of file names")
-    for name in names:
-        if not isinstance(name, str) or not re.fullmatch(r"\w[\w.-]*", name):
-            refuse(
-                path,
-                f"{key!r} holds {name!r}, which is not a plain file name without a folder",
-            )
-        if names.count(name) > 1:
-            refuse(path, f"{key!r} holds {name!r} twice")
-    return tuple(names)
 
 
 def _is_json(value: Any) -> bool:
@@ -287,12 +319,7 @@ def _same_type(value: Any, literal: Any) -> bool:
 def _kind(value: Any) -> str:
     if value is None:
         return "null"
-    kinds = {
-        bool: "true or false",
-        int: "a whole number",
-        float: "a number",
-        str: "text",
-    }
+    kinds = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
     return (kinds | {list: "a list", dict: "an object"}).get(type(value), "no JSON value")
 
 

@@ -1,4 +1,4 @@
-"""Runs: notebooks with their parameters, checked before any of them begins."""
+"""Runs: notebooks with their parameters, checked and put in order before any of them begins."""
 
 from __future__ import annotations
 
@@ -9,29 +9,46 @@ from typing import Any
 
 import joblib
 
-from replication.pipeline import provenance
+from replication.errors import unknown
+from replication.pipeline.inputs import NEUTRAL, Inputs, inputs_of
+from replication.pipeline.manifest import State, read_manifest, state_of
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook, refuse
 
 
 @dataclass(frozen=True)
 class Run:
-    """A notebook with the parameters of a run, and everything that its outputs depend on."""
+    """A notebook with the parameters of a run, and everything that its outputs depend on.
+
+    `out` holds the folders of all notebooks; this one publishes into the folder of its name.
+    """
 
     notebook: Notebook
     values: Mapping[str, Any]
-    inputs: provenance.Inputs
+    inputs: Inputs
+    out: Path
+
+    @property
+    def name(self) -> str:
+        """The notebook's name."""
+        return self.notebook.name
+
+    @property
+    def folder(self) -> Path:
+        """The folder that it publishes."""
+        return self.out / self.name
+
+    @property
+    def state(self) -> State:
+        """Whether what is published is up to date."""
+        return state_of(self.folder, self.inputs)
 
     def again(self) -> Run:
         """Return the same run with what its outputs depend on now."""
-        provenance.forget_sources()
-        return replace(self, inputs=provenance.inputs_of(self.notebook, self.values))
+        return replace(self, inputs=inputs_of(self.notebook, self.values, self.out))
 
 
 def run_name(
-    profile: str,
-    *,
-    seed: int | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    profile: str, *, seed: int | None = None, parameters: Mapping[str, Any] | None = None
 ) -> str:
     """Name what a run is: its profile, or "custom" where a result may differ from the profile's.
 
@@ -45,7 +62,7 @@ def run_name(
 
 def departures(seed: int | None, parameters: Mapping[str, Any] | None) -> list[str]:
     """Return the options by which a run departs from its profile."""
-    named = [f"-p {name}" for name in parameters or {} if name not in provenance.NEUTRAL]
+    named = [f"-p {name}" for name in parameters or {} if name not in NEUTRAL]
     return named if seed is None else [*named, "--seed"]
 
 
@@ -53,23 +70,29 @@ def prepare(
     notebooks: Sequence[Path],
     *,
     profile: str,
+    out: Path,
     jobs: int | None = None,
     seed: int | None = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> list[Run]:
     """Read notebooks and check everything that can be checked before one runs.
 
+    Returns
+    -------
+    list of Run
+        In the given order, but for notebooks that need others: these stand before them.
+
     Raises
     ------
     NotebookError
-        If a notebook cannot be run, or a parameter is unknown or of the wrong type.
+        If a notebook cannot be run, a parameter is unknown or of the wrong type, or a notebook
+        needs another one whose outputs are not in `out`.
     """
-    if parameters and "out" in parameters:
-        raise NotebookError("'out' is the folder that the outputs are published from; use --out")
-    provenance.forget_sources()
+    for name in {"out", "results"} & (parameters or {}).keys():
+        raise NotebookError(f"{name!r} follows from the folder of the outputs; use --out")
     runs = []
-    for notebook in map(read_notebook, notebooks):
-        values = {**notebook.profiles.get(profile, {}), **(parameters or {})}
+    for notebook in _ordered([read_notebook(path) for path in notebooks], out):
+        values = {**notebook.declared.profiles.get(profile, {}), **(parameters or {})}
         if jobs is not None:
             values.setdefault("jobs", jobs)
         elif "jobs" in notebook.literals:
@@ -77,24 +100,33 @@ def prepare(
         if seed is not None:
             values["seed"] = seed
         notebook.check(values)
-        runs.append(Run(notebook, values, provenance.inputs_of(notebook, values)))
-    _check_apart([run.notebook for run in runs])
+        runs.append(Run(notebook, values, inputs_of(notebook, values, out), out))
     return runs
 
 
-def _check_apart(notebooks: Sequence[Notebook]) -> None:
-    """Refuse notebooks that would overwrite each other's files."""
-    owners: dict[str, Notebook] = {}
+def _ordered(notebooks: Sequence[Notebook], out: Path) -> list[Notebook]:
+    """Put notebooks behind those that they need; refuse a need that is neither there nor asked."""
+    asked: dict[str, Notebook] = {}
     for notebook in notebooks:
-        own = set(notebook.published) - set(notebook.merged)
-        for name in sorted(own):
-            if name in owners:
-                refuse(notebook.path, f"would overwrite {name} of {owners[name].path}")
-            owners[name] = notebook
+        if notebook.name in asked:
+            refuse(notebook.path, f"has the name of {asked[notebook.name].path}")
+        asked[notebook.name] = notebook
+    ordered: dict[str, Notebook] = {}
+
+    def add(notebook: Notebook, behind: tuple[str, ...]) -> None:
+        if notebook.name in behind:
+            refuse(notebook.path, f"needs itself: {' needs '.join((*behind, notebook.name))}")
+        for need in notebook.declared.needs:
+            if need in asked:
+                add(asked[need], (*behind, notebook.name))
+            elif not (notebook.path.parent / f"{need}.ipynb").exists():
+                known = sorted(path.stem for path in notebook.path.parent.glob("*.ipynb"))
+                refuse(notebook.path, f"needs {unknown(need, known, 'notebook')}")
+            elif not read_manifest(out / need):
+                first = f"first: replicate run {need}, with the same options"
+                refuse(notebook.path, f"needs the outputs of {need} in {out}; {first}")
+        ordered[notebook.name] = notebook
+
     for notebook in notebooks:
-        for name in notebook.merged:
-            if name in owners:
-                refuse(
-                    notebook.path,
-                    f"merges {name}, which {owners[name].path} overwrites",
-                )
+        add(notebook, ())
+    return list(ordered.values())

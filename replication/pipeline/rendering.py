@@ -1,76 +1,98 @@
-"""Executed notebooks as files: published with links to their outputs, and kept true to their text.
-
-An executed notebook holds its pictures. The one that is published beside the outputs links to them
-instead, so that it is small, can be kept under version control and is read without a run.
-"""
+"""Executed notebooks as files: free of what differs between equal runs, and true to their text."""
 
 from __future__ import annotations
 
-import base64
-import re
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import nbformat
 
+from replication import files
+from replication.pipeline.inputs import NEUTRAL
 from replication.pipeline.notebook import INJECTED, Notebook
 
+ERROR = "papermill-error-cell-tag"
+"""The tag of cells in which papermill points to an error."""
 
-def linked(executed: Path, files: Path) -> str:
-    """Return an executed notebook in which what is also a file of a folder is a link to it.
 
-    Parameters
-    ----------
-    executed
-        The executed notebook.
-    files
-        The folder with the PNG and HTML files that the notebook wrote.
+def read_executed(file: Path, folders: Mapping[Path, Path]) -> Any:
+    """Return the notebook that papermill has written, without the cells that it adds for an error.
+
+    `folders` maps folders whose paths may be in it to those that it shall name instead.
     """
-    pictures = {path.read_bytes(): path.name for path in sorted(files.glob("*.png"))}
-    pages = {path.read_text(encoding="utf-8"): path.name for path in sorted(files.glob("*.html"))}
-    node = nbformat.read(executed, as_version=4)
-    for output in (one for cell in node.cells for one in cell.get("outputs", [])):
-        data = output.get("data", {})
-        picture = pictures.get(base64.b64decode(data.get("image/png", "")))
-        page = pages.get(data.get("text/html", ""))
-        if picture is not None:
-            alt = output.metadata.get("image/png", {}).get("alt", "")
-            output.data = {"text/markdown": f"![{_escaped(alt)}]({picture})"}
-            output.metadata = {}
-        elif page is not None:
-            output.data = {"text/markdown": f"[{page}]({page})"}
-            output.metadata = {}
-    return str(nbformat.writes(node)) + "\n"
+    text = file.read_text(encoding="utf-8")
+    for folder, other in folders.items():
+        text = text.replace(json.dumps(str(folder))[1:-1], json.dumps(files.shown_as(other))[1:-1])
+    node = nbformat.reads(text, as_version=4)
+    node.cells = [cell for cell in node.cells if ERROR not in _tags(cell)]
+    return node
+
+
+def clean(notebook: Notebook, node: Any) -> None:
+    """Remove from an executed notebook what differs between equal runs."""
+    node.metadata.pop("papermill", None)
+    # recorded in the manifest as major.minor
+    node.metadata.get("language_info", {}).pop("version", None)
+    known = {cell.get("id") for cell in notebook.load().cells}
+    unknown = [cell for cell in node.cells if cell.get("id") not in known]
+    for number, cell in enumerate(unknown, start=1):
+        cell.id = f"papermill-{number}"
+    for cell in node.cells:
+        cell.metadata.pop("papermill", None)
+        _drop_empty_tags(cell)
+        if INJECTED in _tags(cell):
+            lines = cell.source.split("\n")
+            cell.source = "\n".join(_as_declared(notebook, line) for line in lines)
+
+
+def link_players(node: Any) -> None:
+    """Replace each player in an executed notebook by a link to its file, which is large."""
+    for output in (output for cell in node.cells for output in cell.get("outputs", [])):
+        shown = output.get("metadata", {}).get("replication", {})
+        if shown.get("kind") == "player":
+            file = f"{shown['name']}.html"
+            output.data = {"text/markdown": f"[{shown.get('alt') or file}]({file})"}
 
 
 def rendered(notebook: Notebook, executed: Path) -> str:
-    """Return an executed notebook with the prose of the notebook; nothing is executed."""
+    """Return a published notebook with the text and the code of the notebook; nothing is executed.
+
+    The code may differ in comments and layout only.
+    """
     node = nbformat.read(executed, as_version=4)
     code = [cell for cell in node.cells if cell.cell_type == "code"]
     cells = []
     for at, cell in enumerate(notebook.load().cells):
-        drop_empty_tags(cell)
+        _drop_empty_tags(cell)
         cells.append(cell)
         if cell.cell_type != "code":
             continue
         done = code.pop(0)
         cell.outputs, cell.execution_count = done.outputs, done.execution_count
-        if at == notebook.at and code and _is_injected(code[0]):
+        if at == notebook.at and code and INJECTED in _tags(code[0]):
             cells.append(code.pop(0))
     node.cells = cells
+    return as_text(node)
+
+
+def as_text(node: Any) -> str:
+    """Return a notebook as the text of its file."""
     return str(nbformat.writes(node)) + "\n"
 
 
-def drop_empty_tags(cell: Any) -> None:
+def _as_declared(notebook: Notebook, line: str) -> str:
+    """Return a line of the injected parameters; one that changes no result as it is declared."""
+    name = line.partition(" = ")[0]
+    return f"{name} = {notebook.literals[name]!r}" if name in NEUTRAL - {"out"} else line
+
+
+def _drop_empty_tags(cell: Any) -> None:
     """Make cells that papermill has seen equal to those that it has not."""
     if not cell.metadata.get("tags", True):
         del cell.metadata["tags"]
 
 
-def _is_injected(cell: Any) -> bool:
-    return INJECTED in cell.metadata.get("tags", [])
-
-
-def _escaped(text: str) -> str:
-    """Return text that Markdown shows as it is."""
-    return re.sub(r"([\\\[\]*_`<])", r"\\\1", text)
+def _tags(cell: Any) -> list[str]:
+    return list(cell.metadata.get("tags", []))

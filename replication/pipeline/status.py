@@ -1,53 +1,55 @@
-"""What is up to date in a folder of outputs, in words, and what to do next."""
+"""What is published against what is declared: what is up to date, and what is left over."""
 
 from __future__ import annotations
 
 import datetime
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from replication.pipeline import provenance
-from replication.pipeline.cleaning import gone
-from replication.pipeline.freshness import FRESH, MISSING, PROSE, read_runs, state_of
+from replication.pipeline.folders import exclusive
+from replication.pipeline.manifest import (
+    FRESH,
+    MISSING,
+    damaged,
+    published_folders,
+    read_manifest,
+    read_runs,
+)
+from replication.pipeline.notebook import MANIFEST, refuse
 from replication.pipeline.plan import Run
 
 
-def status_lines(
-    runs: Sequence[Run], out: Path, folder: Path, options: Sequence[str] = ()
-) -> list[str]:
+def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) -> list[str]:
     """Return the state of every figure and table, notebook by notebook, a line each.
 
     Parameters
     ----------
     runs
-        The notebooks with their parameters and inputs of now.
-    out, folder
-        The outputs, and the executed notebooks.
+        All notebooks with their parameters and inputs of now.
+    out
+        The folder that holds the notebooks' folders.
     options
         The options that choose these outputs, for the commands that are recommended.
     """
-    remembered, manifest = read_runs(folder), provenance.read_manifest(out)
+    recorded = read_runs(out)
     lines, due = [], []
     for run in runs:
-        notebook, state = run.notebook, state_of(run, out, folder)
-        done = remembered.get(notebook.name)
-        when = f" ({done['seconds']:.0f} s, {_age(done['finished'])})" if done else ""
-        said = FRESH if state.kind == PROSE else state.kind
-        lines.append(f"{notebook.name}: {said}{when}")
-        lines += [f"    because {reason}" for reason in _reasons(state.why)]
-        if state.kind == PROSE:
-            lines.append("    only its text has changed, which is not executed")
+        state, last = run.state, recorded.get(run.name)
+        when = f" ({last['seconds']:.0f} s, {_age(last['finished'])})" if last else ""
+        lines.append(f"{run.name}: {state.kind}{when}")
+        lines += [f"    because {reason}" for reason in _shortened(state.why)]
         if state.kind != FRESH:
-            due.append(notebook.name)
-        lost = provenance.damaged(out, manifest[notebook.name]) if notebook.name in manifest else {}
-        for stem, names in _by_stem(notebook.outputs).items():
-            own = {lost.get(name, said) for name in names}
-            states = ", ".join(sorted(own - {said})) or said
-            if not any((out / name).exists() for name in names):
-                states = MISSING
+            due.append(run.name)
+        manifest = read_manifest(run.folder)
+        lost = damaged(run.folder, manifest) if manifest else {}
+        for stem, names in _by_stem(run.notebook.declared.outputs).items():
+            states = {lost.get(name, state.kind) for name in names}
+            text = ", ".join(sorted(states - {state.kind})) or state.kind
+            if not any((run.folder / name).exists() for name in names):
+                text = MISSING
             suffixes = " ".join(name.removeprefix(stem) for name in names)
-            lines.append(f"    {states:<9}{stem} {suffixes}")
+            lines.append(f"    {text:<9}{stem} {suffixes}")
     left = gone(runs, out)
     lines += [f"{name}: its notebook is gone" for name in left]
     lines.append("")
@@ -60,20 +62,64 @@ def status_lines(
     return lines
 
 
+def gone(runs: Sequence[Run], out: Path) -> list[str]:
+    """Return the published folders whose notebooks are not there any more."""
+    return sorted(published_folders(out).keys() - {run.name for run in runs})
+
+
+def clean(runs: Sequence[Run], out: Path, *, dry_run: bool, echo: Callable[[str], object]) -> None:
+    """Remove files that no notebook declares from the notebooks' folders.
+
+    Of a notebook that is gone, only what its manifest names is removed, and the folder if it is
+    empty then. Everything else in `out` stays, such as stored trials.
+
+    Parameters
+    ----------
+    runs
+        All notebooks.
+    out
+        The folder that holds the notebooks' folders.
+    dry_run
+        Whether only to say what would be removed.
+    echo
+        Prints a line.
+
+    Raises
+    ------
+    NotebookError
+        If nothing there was published by a run, so that the files may be anybody's.
+    """
+    if not published_folders(out):
+        refuse(out, f"has no folder with a {MANIFEST} of ours, so nothing is removed there")
+    with exclusive(out, echo):
+        manifests = published_folders(out)
+        declared = {run.name: {*run.notebook.published, MANIFEST} for run in runs}
+        for name, manifest in manifests.items():
+            there = {path.name for path in (out / name).iterdir() if path.is_file()}
+            listed = {*manifest["outputs"], MANIFEST}
+            surplus = there - declared[name] if name in declared else there & listed
+            for file in sorted(surplus, key=lambda file: (file == MANIFEST, file)):
+                if not dry_run:
+                    (out / name / file).unlink()
+                echo(f"{'would remove' if dry_run else 'removed'} {name}/{file}")
+            if not dry_run and not any((out / name).iterdir()):
+                (out / name).rmdir()
+
+
 def _command(*words: str) -> str:
     return shlex.join(("replicate", *words))
 
 
-def _reasons(why: Sequence[str]) -> list[str]:
-    """Shorten a long list of reasons."""
-    return [*why[:5], f"{len(why) - 5} more"] if len(why) > 6 else list(why)
+def _shortened(reasons: Sequence[str]) -> list[str]:
+    """Return at most six reasons, or five and the number of the others."""
+    return [*reasons[:5], f"{len(reasons) - 5} more"] if len(reasons) > 6 else list(reasons)
 
 
 def _by_stem(names: Sequence[str]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
+    stems: dict[str, list[str]] = {}
     for name in sorted(names):
-        found.setdefault(Path(name).stem, []).append(name)
-    return found
+        stems.setdefault(Path(name).stem, []).append(name)
+    return stems
 
 
 def _age(finished: str) -> str:

@@ -16,14 +16,11 @@ from contextlib import contextmanager
 import joblib
 
 from replication.irl.agent import Agent
-from replication.progress import trial_meter
+from replication.progress import SCHEDULER, trial_meter
 from replication.trials.compute import compute, trial_key
 from replication.trials.condition import Condition
 from replication.trials.results import Results
 from replication.trials.store import Store
-
-SCHEDULER = "REPLICATION_SCHEDULER"
-"""Environment variable with the address of a Dask scheduler that trials are sent to."""
 
 
 class WorkerError(RuntimeError):

@@ -1,8 +1,11 @@
 """Trials on a Dask cluster: a scheduler and two workers on loopback, and what may go wrong."""
 
 import os
+import re
+import shlex
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -18,10 +21,12 @@ from replication import Demos
 from replication.files import PROJECT
 from replication.irl import Trial
 from replication.paper.params import Params
+from replication.progress import SCHEDULER
 from replication.trials.condition import Condition
 from replication.trials.results import Results
-from replication.trials.run import SCHEDULER, WorkerError, run_trials
+from replication.trials.run import WorkerError, run_trials
 from replication.trials.store import Store
+from tests.faults.checkout import Checkout, Reference, gone, listening, wait
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -151,20 +156,21 @@ def test_a_notebook_runs_on_a_cluster(
         new_code_cell('out = "x"\nseed = 5', metadata={"tags": ["parameters"]}, id="a"),
         new_code_cell(
             "import os\nfrom pathlib import Path\n"
-            "from replication import Maze, demonstrate, trials\n"
+            "from replication import Maze, demonstrate\n"
             "from replication.paper.params import Params\n"
-            "from replication.trials.condition import Setting\n"
+            "from replication.trials.condition import Condition\n"
+            "from replication.trials.run import run_trials\n"
             "from replication.trials.store import Store\n"
             "maze = Maze.from_text('....G\\n.#...\\nS....')\n"
             "params = Params.of(episodes=60, horizon=40, max_iterations=40)\n"
-            "setting = Setting(demonstrate('small', maze), 'unified', params)\n"
-            "store = Store(Path(out).parent / 'trials.sqlite')\n"
-            "results = trials.run_trials([setting], trials=3, store=store, seed=seed)\n"
-            "(Path(out) / 'curves.txt').write_text(results.errors(setting).tobytes().hex())",
+            "condition = Condition(demonstrate('small', maze), 'unified', params)\n"
+            "store = Store(Path(out).parent.parent / 'trials.sqlite')\n"
+            "results = run_trials([condition], trials=3, store=store, seed=seed)\n"
+            "(Path(out) / 'curves.txt').write_text(results.errors(condition).tobytes().hex())",
             id="b",
         ),
     ]
-    node = new_notebook(cells=cells, metadata={"replication": {"outputs": ["curves.txt"]}})
+    node = new_notebook(cells=cells, metadata={"replication": {"data": ["curves.txt"]}})
     path = tmp_path / "toy.ipynb"
     nbformat.write(node, path)
     address = start().address
@@ -179,5 +185,60 @@ def test_a_notebook_runs_on_a_cluster(
             timeout=300,
         )
         assert done.returncode == 0, done.stderr
-        found.append((out / "curves.txt").read_text())
+        found.append((out / "toy" / "curves.txt").read_text())
     assert found[0] == found[1]
+
+
+def test_the_cluster_of_the_manual(checkout: Checkout, reference: Reference) -> None:
+    """Its commands listen on loopback only; with a worker killed on the way, no byte differs."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    pages = (PROJECT / "README.md", PROJECT / "docs" / "running.md")
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    found = re.findall(r"^ *\.venv/bin/dask (.+) &$", text.replace("8786", port), re.MULTILINE)
+    commands = list(dict.fromkeys(found))
+    environment = os.environ | {
+        "FAULTS_MARK": checkout.mark,
+        "PYTHONPATH": str(checkout.folder),
+        "TMPDIR": str(checkout.scratch),
+        "TOY_NOTES": str(checkout.notes),
+        "TOY_GATE": str(checkout.gate),
+    }
+    cluster = [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *shlex.split(command)],
+            cwd=checkout.scratch,
+            env=environment | {"TOY_PAUSE": "0.3"},
+            stderr=subprocess.DEVNULL,
+        )
+        for command in commands
+    ]
+    try:
+        assert len(cluster) == 2
+        assert wait(lambda: len(_children(cluster[1].pid)) == 2)
+        run = checkout.start("run", "--scheduler", f"tcp://127.0.0.1:{port}")
+        assert wait(lambda: checkout.computed)
+        assert listening(checkout.mark) == {"127.0.0.1"}
+        os.kill(_children(cluster[1].pid)[0], signal.SIGKILL)
+        complained = run.communicate(timeout=120)[1]
+        assert run.returncode == 0, complained
+        assert checkout.results() == reference.results
+    finally:
+        for process in reversed(cluster):
+            process.terminate()
+            process.wait(timeout=60)
+    assert gone(checkout.mark)
+
+
+def _children(parent: int) -> list[int]:
+    """Return the worker processes that `dask worker` has started."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            own = (folder / "stat").read_text().rpartition(")")[2].split()[1] == str(parent)
+            if own and b"spawn_main" in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found

@@ -1,18 +1,21 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import nbformat
+import papermill
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
-from replication.files import write_file
-from replication.pipeline.execute import execute
+from replication.pipeline import driver
+from replication.pipeline.execute import KERNEL, execute
 from replication.pipeline.notebook import NotebookError, RunError, read_notebook
 from replication.pipeline.rendering import rendered
 from replication.progress import Display
@@ -46,7 +49,7 @@ def write(project: Path, *code: str, prose: str = "# Toy") -> Any:
         new_code_cell(PARAMETERS, id="parameters", metadata={"tags": ["parameters"]}),
         *(new_code_cell(source, id=f"code-{at}") for at, source in enumerate(code)),
     ]
-    node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
+    node = new_notebook(cells=cells, metadata={"replication": {}})
     nbformat.write(node, project / "toy.ipynb")
     return node
 
@@ -56,23 +59,22 @@ def run(project: Path) -> Run:
     """Execute the notebook and return the executed one."""
 
     def run(
-        stage: str = "stage", target: str = "figures", timeout: int = 60, **given: Any
+        stage: str = "stage", target: str = "figures/toy", timeout: int = 60, **given: Any
     ) -> bytes:
         scheduler = given.pop("scheduler", "")
         (project / stage).mkdir(parents=True, exist_ok=True)
-        executed = project / "executed" / "toy.ipynb"
         with Display(1, bars=False) as display:
-            execute(
+            text = execute(
                 read_notebook(project / "toy.ipynb"),
                 given,
                 project / stage,
-                target=project / target,
-                executed=executed,
+                folders={project / stage: project / target},
+                failed=project / "failed.ipynb",
                 timeout=timeout,
                 display=display,
                 scheduler=scheduler,
             )
-        return executed.read_bytes()
+        return text.encode()
 
     return run
 
@@ -95,17 +97,17 @@ def test_equal_runs_give_equal_bytes(run: Run, project: Path) -> None:
 
 def test_executed_notebook_has_no_path_of_the_machine(run: Run, project: Path) -> None:
     """The folder of the outputs is named from the project on, and nothing has a time."""
-    content = run(target="build/quick", store=str(project / "mine")).decode()
+    content = run(target="build/quick/toy", store=str(project / "mine")).decode()
     assert str(project) not in content
     assert "stage" not in content
     assert not re.search(r"\d\d:\d\d|start_time|papermill_record|duration", content)
     shown = cells(content.encode())
     assert [cell.id for cell in shown] == ["head", "parameters", "papermill-1", "code-0"]
     outputs = {output.get("name", "result"): output for output in shown[-1].outputs}
-    assert outputs["stderr"].text == "build/quick True\n"
+    assert outputs["stderr"].text == "build/quick/toy True\n"
     assert outputs["stdout"].text == "0\n1\n2\n3\n"
-    assert "PosixPath('build/quick/a.txt')" in outputs["result"].data["text/plain"]
-    assert 'out = "build/quick"' in shown[2].source
+    assert "PosixPath('build/quick/toy/a.txt')" in outputs["result"].data["text/plain"]
+    assert 'out = "build/quick/toy"' in shown[2].source
     assert "mine" not in content
 
 
@@ -117,7 +119,7 @@ def test_folders_outside_the_project_are_named_only(
     monkeypatch.setattr(files, "PROJECT", project / "inner")
     content = run().decode()
     assert str(project) not in content
-    assert cells(content.encode())[-1].outputs[-1].data["text/plain"].count("figures/a.txt") == 1
+    assert cells(content.encode())[-1].outputs[-1].data["text/plain"].count("toy/a.txt") == 1
 
 
 def test_older_notebooks_give_equal_bytes(run: Run, project: Path) -> None:
@@ -139,7 +141,7 @@ def test_a_failed_notebook_can_be_seen(run: Run, project: Path) -> None:
     with pytest.raises(RunError, match=r"toy\.ipynb: cell 3 failed: ZeroDivisionError") as caught:
         run()
     assert "ZeroDivisionError" in caught.value.details
-    shown = nbformat.read(project / "executed" / "toy.ipynb", as_version=4)
+    shown = nbformat.read(project / "failed.ipynb", as_version=4)
     errors = [
         output.ename
         for cell in shown.cells
@@ -148,17 +150,76 @@ def test_a_failed_notebook_can_be_seen(run: Run, project: Path) -> None:
         if output.output_type == "error"
     ]
     assert errors == ["ZeroDivisionError"]
-    assert str(project / "stage") not in (project / "executed" / "toy.ipynb").read_text()
+    assert str(project / "stage") not in (project / "failed.ipynb").read_text()
 
 
 def test_mistakes_are_the_users(run: Run, project: Path) -> None:
-    """What the package refuses is told as a mistake, in one line."""
-    write(
-        project,
-        "from replication.paper.register import ChoiceError\nraise ChoiceError('so\\nmore')",
-    )
+    """What the package refuses is told as a mistake, in one line; the notebook is kept."""
+    code = "from replication.paper.register import ChoiceError\nraise ChoiceError('so\\nmore')"
+    write(project, code)
     with pytest.raises(NotebookError, match=r"toy\.ipynb: so$"):
         run()
+    assert "error: so" in (project / "failed.ipynb").read_text()
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("import os; os.kill(os.getpid(), 9)", r"cell 3: the kernel was killed.*memory"),
+        ("import time; time.sleep(60)", r"cell 3 took more than 8 seconds.*--timeout"),
+        ("import sys; sys.exit()", r"cell 3 ended the notebook before its last cell"),
+        ("import os; os.kill(os.getppid(), 9)", r"its process failed: it was killed"),
+    ],
+)
+def test_what_ends_a_kernel_is_named(run: Run, project: Path, code: str, message: str) -> None:
+    """A kernel that was killed, a cell over its time or that ends the notebook has its own line."""
+    write(project, code, "done = 1")
+    with pytest.raises(RunError, match=rf"toy\.ipynb: {message}"):
+        run(timeout=8)
+
+
+def test_only_the_start_of_a_kernel_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kernel that does not start is started again; a cell never runs twice."""
+    calls: list[bool] = []
+
+    def execute(*, on_cell_execute: Callable[..., None], **_: Any) -> None:
+        calls.append(len(calls) == 1)
+        if calls[-1]:
+            on_cell_execute(cell=None, cell_index=1)
+        raise RuntimeError("Kernel died")
+
+    def fault() -> Any:
+        (tmp_path / "options.json").write_text(json.dumps({"parent": os.getppid()}))
+        driver.main(tmp_path)
+        return json.loads((tmp_path / "fault.json").read_text())
+
+    monkeypatch.setattr(papermill, "execute_notebook", execute)
+    assert fault() == {"cell": 1, "kind": "RuntimeError", "message": "Kernel died"}
+    assert calls == [False, True]
+    assert fault()["cell"] is None
+    assert len(calls) == 2 + driver.STARTS
+
+
+def test_the_kernel_is_our_interpreter(
+    run: Run, project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It runs in the user's folder; foreign kernels of its name and start-up files take no part."""
+    foreign = project / "jupyter" / "kernels" / KERNEL
+    foreign.mkdir(parents=True)
+    spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
+    (foreign / "kernel.json").write_text(json.dumps(spec))
+    (project / "startup.py").write_text("foreign = True")
+    monkeypatch.setenv("JUPYTER_PATH", str(project / "jupyter"))
+    monkeypatch.setenv("PYTHONSTARTUP", str(project / "startup.py"))
+    monkeypatch.chdir(project)
+    seen = "(sys.executable, os.getcwd(), trials, name, 'foreign' in dir())"
+    write(project, f"import json, os, sys\nprint(json.dumps({seen}))")
+    (output,) = cells(run(trials=7, name='it\'s "quoted"'))[-1].outputs
+    expected = [sys.executable, "figures/toy", 7, 'it\'s "quoted"', False]
+    expected[1] = str(project)
+    assert json.loads(output.text) == expected
 
 
 def test_scheduler_reaches_the_notebook(
@@ -190,61 +251,44 @@ def test_progress_of_trials_leaves_no_trace(
     )
     assert cells(run())[-1].outputs == []
     told = capsys.readouterr().err.splitlines()
-    assert [line.split("trials")[0] for line in told] == [
-        f"  {10 * k:3d} % of 10 " for k in range(1, 11)
-    ]
+    assert told[-1].startswith("  100 % of 10 trials, ")
 
 
 # --- new prose in an executed notebook -------------------------------------------------------
 
 
 @pytest.fixture
-def no_kernel(run: Run, monkeypatch: pytest.MonkeyPatch) -> bytes:
-    """Execute the notebook once, and then fail when anything is executed."""
-    first = run(trials=4)
-    monkeypatch.setattr("papermill.execute_notebook", pytest.fail)
-    return first
+def published(run: Run, project: Path) -> Path:
+    """Execute the notebook once and publish it."""
+    (project / "published.ipynb").write_bytes(run(trials=4))
+    return project / "published.ipynb"
 
 
-def test_render_is_what_a_run_would_give(run: Run, project: Path) -> None:
+def test_render_is_what_a_run_would_give(run: Run, published: Path, project: Path) -> None:
     """Text, comments, and cells of text that come or go: rendering spares an execution."""
-    run(trials=4)
     node = write(project, f"# why\n{CODE}", prose="# Labyrinth\nmore")
     node.cells[1].source = f"# So many:\n{PARAMETERS}"
     node.cells.insert(0, new_markdown_cell("Before", id="before"))
     node.cells.insert(3, new_markdown_cell("Behind the parameters", id="behind"))
     node.cells.append(new_markdown_cell("The end", id="end"))
     nbformat.write(node, project / "toy.ipynb")
-    text = rendered(read_notebook(project / "toy.ipynb"), project / "executed" / "toy.ipynb")
+    text = rendered(read_notebook(project / "toy.ipynb"), published)
     assert "Labyrinth" in cells(text.encode())[1].source
     assert text.encode() == run(trials=4)
 
 
-def test_render_keeps_outputs(no_kernel: bytes, project: Path) -> None:
-    """Rendered twice, there and back, an executed notebook is as it was."""
-    executed = project / "executed" / "toy.ipynb"
-    write(project, f"{CODE}# a comment", prose="Only text")
-    notebook = read_notebook(project / "toy.ipynb")
-    write_file(executed, rendered(notebook, executed))
-    shown = cells(executed.read_bytes())
-    assert shown[0].source == "Only text"
-    assert shown[-1].source.endswith("# a comment")
-    assert [c.get("outputs") for c in shown] == [c.get("outputs") for c in cells(no_kernel)]
-    assert not any(cell.get("outputs") for cell in notebook.load().cells)
-    write(project, CODE)
-    write_file(executed, rendered(read_notebook(project / "toy.ipynb"), executed))
-    assert executed.read_bytes() == no_kernel
-
-
-@pytest.mark.parametrize("cut", [[0], [0, 1]])
-def test_render_follows_cells_of_text(no_kernel: bytes, project: Path, cut: list[int]) -> None:
-    """Cells of text that were removed are gone, and the code cells keep their outputs."""
-    node = write(project, CODE)
-    node.cells[:1] = [new_markdown_cell(f"{k}", id=f"text-{k}") for k in cut]
+def test_render_goes_there_and_back(published: Path, project: Path) -> None:
+    """Rendered twice, also with other cells of text, an executed notebook is as it was."""
+    before = published.read_bytes()
+    node = write(project, f"{CODE}# a comment", prose="Only text")
+    node.cells[:1] = [new_markdown_cell(f"{k}", id=f"text-{k}") for k in range(2)]
     nbformat.write(node, project / "toy.ipynb")
-    executed = project / "executed" / "toy.ipynb"
-    write_file(executed, rendered(read_notebook(project / "toy.ipynb"), executed))
-    shown = cells(executed.read_bytes())
-    assert [cell.source for cell in shown if cell.cell_type == "markdown"] == [str(k) for k in cut]
+    published.write_text(rendered(read_notebook(project / "toy.ipynb"), published))
+    shown = cells(published.read_bytes())
+    assert [cell.source for cell in shown if cell.cell_type == "markdown"] == ["0", "1"]
     assert [cell.id for cell in shown][-3:] == ["parameters", "papermill-1", "code-0"]
-    assert shown[-1].outputs == cells(no_kernel)[-1].outputs
+    assert shown[-1].source.endswith("# a comment")
+    assert shown[-1].outputs == cells(before)[-1].outputs
+    write(project, CODE)
+    published.write_text(rendered(read_notebook(project / "toy.ipynb"), published))
+    assert published.read_bytes() == before

@@ -23,7 +23,7 @@ def write(tmp_path: Path) -> Write:
     def write(*, parameters: str = PARAMETERS, **declared: Any) -> Path:
         cells = [new_markdown_cell("# Toy"), new_code_cell(parameters)]
         cells[1].metadata["tags"] = ["parameters"]
-        node = new_notebook(cells=cells, metadata={"replication": {"outputs": []} | declared})
+        node = new_notebook(cells=cells, metadata={"replication": declared})
         path = tmp_path / "toy.ipynb"
         nbformat.write(node, path)
         return path
@@ -66,33 +66,48 @@ def test_literals_are_read_with_comments_and_signs(write: Write) -> None:
 @pytest.mark.parametrize(
     ("declared", "message"),
     [
-        ({"outputs": ["../a.png"]}, "'../a.png', which is not a plain file name"),
-        ({"outputs": ["/a.png"]}, "'/a.png', which is not a plain file name"),
-        ({"outputs": [".."]}, "'..', which is not a plain file name"),
-        ({"outputs": [1]}, "1, which is not a plain file name"),
-        ({"outputs": ["a.png", "a.png"]}, "'a.png' twice"),
-        ({"outputs": "a.png"}, "'outputs' must be a list"),
-        ({"inputs": "a.toml"}, "'inputs' must be a list of files"),
-        ({"inputs": [1]}, "'inputs' must be a list of files"),
-        ({"merge": ["a.csv"]}, "unknown declaration 'merge' (did you mean 'merged'?)"),
-        ({"profiles": {"quick": 3}}, "'profiles' must hold an object"),
+        ({"data": ["../a.png"]}, "'../a.png' is not a plain name"),
+        ({"figures": ["/a"]}, "'/a' is not a plain name"),
+        ({"tables": [".."]}, "'..' is not a plain name"),
+        ({"data": [1]}, "'data.0': Input should be a valid string"),
+        ({"data": ["a.png", "a.png"]}, "'a.png' stands there twice"),
+        ({"data": ["notebook.ipynb"]}, "'notebook.ipynb' is written by every run"),
+        ({"players": "a"}, "'players': Input should be a valid tuple"),
+        ({"inputs": "a.toml"}, "'inputs': Input should be a valid tuple"),
+        ({"figure": ["a"]}, "unknown declaration 'figure' (did you mean 'figures'?)"),
+        ({"needs": ["a"]}, "must have results = 'FOLDER'"),
+        ({"profiles": {"quick": 3}}, "'profiles.quick': Input should be a valid dictionary"),
         ({"profiles": {"quick": {"trails": 3}}}, "(did you mean 'trials'?)"),
         ({"profiles": {"quick": {"trials": 0.5}}}, "'trials' is a whole number"),
         ({"profiles": {"quick": {"out": "x"}}}, "sets 'out'"),
     ],
 )
 def test_declarations_are_checked(write: Write, declared: dict[str, Any], message: str) -> None:
-    """A declaration that cannot be honoured is named and refused."""
-    with pytest.raises(NotebookError, match=re.escape(message)):
+    """A declaration that cannot be honoured is named and refused, in one line."""
+    with pytest.raises(NotebookError, match=re.escape(message)) as caught:
         read_notebook(write(**declared))
+    assert "\n" not in str(caught.value)
 
 
-def test_declarations_are_read(write: Write) -> None:
-    """What is declared comes back; a merged file counts as an output, once."""
-    found = read_notebook(write(outputs=["a", "b"], merged=["b", "c"], inputs=["x/y.toml"]))
-    assert (found.outputs, found.merged) == (("a", "b", "c"), ("b", "c"))
-    assert (found.name, found.at, found.inputs) == ("toy", 1, ("x/y.toml",))
-    assert read_notebook(write()).inputs == ()
+def test_names_stand_for_files(write: Write) -> None:
+    """A figure, table or player is a name; its files are counted once each."""
+    given: dict[str, Any] = {"figures": ["fig05", "sets"], "tables": ["sets"], "players": ["film"]}
+    notebook = read_notebook(write(**given, data=["film.gif", "trials.csv"], inputs=["x/y.toml"]))
+    assert notebook.declared.outputs == (
+        *("fig05.csv", "fig05.png", "fig05.svg", "sets.csv", "sets.png", "sets.svg", "sets.md"),
+        *("film.csv", "film.html", "film.gif", "trials.csv"),
+    )
+    assert notebook.published == (*notebook.declared.outputs, "notebook.ipynb")
+    assert (notebook.name, notebook.at, notebook.declared.inputs) == ("toy", 1, ("x/y.toml",))
+    assert read_notebook(write()).declared.outputs == ()
+
+
+def test_a_notebook_must_declare_something(write: Write) -> None:
+    """Metadata without a declaration are refused with an example."""
+    path = write()
+    path.write_text(path.read_text().replace('"replication"', '"other"'))
+    with pytest.raises(NotebookError, match="do not declare"):
+        read_notebook(path)
 
 
 @pytest.mark.parametrize(

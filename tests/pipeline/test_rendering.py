@@ -9,9 +9,9 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from replication.pipeline.notebook import Notebook, read_notebook
-from replication.pipeline.rendering import linked, rendered
+from replication.pipeline.rendering import as_text, link_players, rendered
 
-PICTURE, OTHER = b"\x89PNG one", b"\x89PNG two"
+PICTURE = base64.b64encode(b"\x89PNG one").decode()
 
 
 def shown(data: dict[str, str], **metadata: Any) -> Any:
@@ -19,29 +19,21 @@ def shown(data: dict[str, str], **metadata: Any) -> Any:
     return new_output("execute_result", data, metadata=metadata, execution_count=1)
 
 
-def picture(content: bytes, alt: str) -> Any:
-    """Return a picture as a notebook shows it."""
-    data = {"image/png": base64.encodebytes(content).decode(), "text/plain": "<Image>"}
-    return shown(data, **{"image/png": {"alt": alt, "width": 700}})
-
-
 @pytest.fixture
 def executed(tmp_path: Path) -> Path:
-    """Write the executed notebook `toy` with outputs, and two of these as files beside it."""
-    (tmp_path / "fig.png").write_bytes(PICTURE)
-    (tmp_path / "film.html").write_text("<p>moves</p>", encoding="utf-8")
+    """Write an executed notebook with a figure, a player, a table and some text."""
+    figure, player = ({"kind": kind, "name": kind} for kind in ("figure", "player"))
     outputs = [
-        picture(PICTURE, "d is 0 [all trials]"),
-        picture(OTHER, "not a file"),
-        shown({"text/html": "<p>moves</p>"}),
+        shown({"image/png": PICTURE}, replication=figure | {"alt": "d is 0"}),
+        shown({"text/html": "<p>moves</p>"}, replication=player | {"alt": "it moves"}),
         shown({"text/html": "<p>a table</p>"}),
-        new_output("stream", name="stdout", text="said"),
+        new_output("stream", name="stdout", text="printed"),
     ]
     injected = new_code_cell("trials = 5", metadata={"tags": ["injected-parameters"]})
     cells = [new_markdown_cell("# Toy"), parameters(), injected]
     cells.append(new_code_cell("show()", outputs=outputs))
-    nbformat.write(new_notebook(cells=cells), tmp_path / "toy.ipynb")
-    return tmp_path / "toy.ipynb"
+    nbformat.write(new_notebook(cells=cells), tmp_path / "executed.ipynb")
+    return tmp_path / "executed.ipynb"
 
 
 def parameters() -> Any:
@@ -51,49 +43,42 @@ def parameters() -> Any:
 
 def notebook(folder: Path, *cells: Any) -> Notebook:
     """Write and read a notebook that was not executed."""
-    node = new_notebook(cells=cells, metadata={"replication": {"outputs": []}})
+    node = new_notebook(cells=cells, metadata={"replication": {}})
     nbformat.write(node, folder / "source.ipynb")
     return read_notebook(folder / "source.ipynb")
 
 
-def test_what_is_a_file_is_linked(executed: Path) -> None:
-    """A picture keeps its words, its bytes are left to the file, and what is no file stays."""
-    node = nbformat.reads(linked(executed, executed.parent), as_version=4)
-    outputs = node.cells[-1].outputs
-    assert outputs[0].data == {"text/markdown": r"![d is 0 \[all trials\]](fig.png)"}
-    assert outputs[0].metadata == {}
-    assert outputs[2].data == {"text/markdown": "[film.html](film.html)"}
+def test_players_are_links(executed: Path) -> None:
+    """A player is a link with its words; figures stay embedded, and what is no file stays."""
+    node = nbformat.read(executed, as_version=4)
     before = nbformat.read(executed, as_version=4).cells[-1].outputs
-    assert [outputs[at] for at in (1, 3, 4)] == [before[at] for at in (1, 3, 4)]
-
-
-def test_linked_notebook_has_the_same_cells(executed: Path) -> None:
-    """Text, code and their order are those of the executed notebook."""
-    node = nbformat.reads(linked(executed, executed.parent), as_version=4)
+    link_players(node)
     nbformat.validate(node)
-    before = nbformat.read(executed, as_version=4)
-    assert [(c.id, c.source) for c in node.cells] == [(c.id, c.source) for c in before.cells]
+    outputs = node.cells[-1].outputs
+    assert outputs[1].data == {"text/markdown": "[it moves](player.html)"}
+    assert outputs[1].metadata == before[1].metadata
+    assert [outputs[at] for at in (0, 2, 3)] == [before[at] for at in (0, 2, 3)]
 
 
 def test_shows_tells_text_apart(executed: Path, tmp_path: Path) -> None:
     """New text, new code or a new cell is seen; what papermill has injected is not."""
+    text = executed.read_text()
     same = [new_markdown_cell("# Toy"), parameters(), new_code_cell("show()")]
-    assert notebook(tmp_path, *same).is_shown_by(executed)
+    assert notebook(tmp_path, *same).shows(text)
     for other in ("# Game", "# Toy\n"):
-        assert not notebook(tmp_path, new_markdown_cell(other), *same[1:]).is_shown_by(executed)
-    more = notebook(tmp_path, *same, new_markdown_cell("The end"))
-    assert not more.is_shown_by(executed)
+        assert not notebook(tmp_path, new_markdown_cell(other), *same[1:]).shows(text)
+    assert not notebook(tmp_path, *same, new_markdown_cell("The end")).shows(text)
 
 
-def test_render_works_on_a_linked_notebook(executed: Path, tmp_path: Path) -> None:
-    """The published notebook gets new text like the full one, and keeps its links."""
-    links = linked(executed, tmp_path)
-    executed.write_text(links, encoding="utf-8")
+def test_new_text_keeps_outputs(executed: Path, tmp_path: Path) -> None:
+    """The published notebook gets new text and layout, and keeps its outputs."""
+    before = nbformat.read(executed, as_version=4)
     source = notebook(
         tmp_path, new_markdown_cell("# Game"), parameters(), new_code_cell("show()  # all")
     )
-    assert not source.is_shown_by(executed)
-    executed.write_text(rendered(source, executed), encoding="utf-8")
-    assert source.is_shown_by(executed)
-    outputs = nbformat.read(executed, as_version=4).cells[-1].outputs
-    assert outputs == nbformat.reads(links, as_version=4).cells[-1].outputs
+    assert not source.shows(executed.read_text())
+    text = rendered(source, executed)
+    assert source.shows(text)
+    assert nbformat.reads(text, as_version=4).cells[-1].outputs == before.cells[-1].outputs
+    executed.write_text(text)
+    assert rendered(source, executed) == text == as_text(nbformat.reads(text, as_version=4))

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
 import datetime
+import fcntl
 import json
+import threading
+import time
 from pathlib import Path
 
 import nbformat
@@ -10,9 +13,11 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import status
-from replication.pipeline.plan import prepare
+from replication.pipeline.manifest import RUNS
+from replication.pipeline.notebook import MANIFEST, NotebookError
+from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import run_notebooks
-from replication.pipeline.status import status_lines
+from replication.pipeline.status import clean, status_lines
 
 
 @pytest.fixture
@@ -22,11 +27,10 @@ def project(toy_project: Path) -> Path:
 
 
 def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "# Maze") -> Path:
-    """Write a notebook with a figure in two formats, a table, and a file that is shared."""
+    """Write a notebook with a figure, a table and a file of data."""
     parameters = new_code_cell('trials = 3\nout = "x"', metadata={"tags": ["parameters"]})
     cells = [new_markdown_cell(prose), parameters, new_code_cell(code)]
-    outputs = [f"{name}_fig.png", f"{name}_fig.svg", f"{name}_table.csv"]
-    declared = {"outputs": outputs, "merged": ["trials.csv"]}
+    declared = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
     node = new_notebook(cells=cells, metadata={"replication": declared})
     nbformat.write(node, project / f"{name}.ipynb")
     return project / f"{name}.ipynb"
@@ -35,13 +39,18 @@ def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "
 def run(project: Path, *names: str) -> None:
     """Run notebooks into `figures`."""
     notebooks = [project / f"{name}.ipynb" for name in names]
-    run_notebooks(notebooks, profile="paper", out=project / "figures", executed=project / "done")
+    run_notebooks(notebooks, profile="paper", out=project / "figures")
+
+
+def prepared(project: Path, *names: str) -> list[Run]:
+    """Return the runs of notebooks as they are now."""
+    paths = [project / f"{name}.ipynb" for name in names]
+    return prepare(paths, profile="paper", out=project / "figures")
 
 
 def lines(project: Path, *names: str) -> list[str]:
     """Return the status of notebooks."""
-    runs = prepare([project / f"{name}.ipynb" for name in names or ("maze",)], profile="paper")
-    return status_lines(runs, project / "figures", project / "done")
+    return status_lines(prepared(project, *names or ("maze",)), project / "figures")
 
 
 def test_before_the_first_run_everything_is_missing(project: Path) -> None:
@@ -49,8 +58,8 @@ def test_before_the_first_run_everything_is_missing(project: Path) -> None:
     write(project)
     assert lines(project) == [
         "maze: missing",
-        "    missing  maze_fig .png .svg",
-        "    missing  maze_table .csv",
+        "    missing  fig .csv .png .svg",
+        "    missing  table .csv .md",
         "    missing  trials .csv",
         "",
         "to bring figures up to date: replicate run maze",
@@ -63,8 +72,8 @@ def test_after_a_run_everything_is_fresh(project: Path) -> None:
     run(project, "maze")
     assert lines(project) == [
         "maze: fresh (0 s, just now)",
-        "    fresh    maze_fig .png .svg",
-        "    fresh    maze_table .csv",
+        "    fresh    fig .csv .png .svg",
+        "    fresh    table .csv .md",
         "    fresh    trials .csv",
         "",
         "everything is fresh; replicate verify proves it",
@@ -88,31 +97,25 @@ def test_what_is_stale_has_its_reasons(project: Path) -> None:
 
 
 def test_prose_alone_is_no_reason_to_execute(project: Path) -> None:
-    """New text leaves figures and tables fresh, and a run is due for the executed notebook."""
+    """New text leaves everything fresh."""
     write(project)
     run(project, "maze")
     write(project, prose="# Labyrinth")
-    found = lines(project)
-    assert found[:2] == [
-        "maze: fresh (0 s, just now)",
-        "    only its text has changed, which is not executed",
-    ]
-    assert [line.split()[0] for line in found[2:5]] == ["fresh"] * 3
-    assert found[-1] == "to bring figures up to date: replicate run maze"
+    assert lines(project)[-1] == "everything is fresh; replicate verify proves it"
 
 
 def test_damaged_outputs_are_told_apart(project: Path) -> None:
     """A file that was deleted or edited has its own state, and is the reason."""
     write(project)
     run(project, "maze")
-    (project / "figures" / "maze_fig.png").write_text("mine")
-    (project / "figures" / "maze_table.csv").unlink()
+    (project / "figures" / "maze" / "fig.png").write_text("mine")
+    (project / "figures" / "maze" / "table.csv").unlink()
     assert lines(project)[:5] == [
         "maze: stale (0 s, just now)",
-        "    because maze_fig.png is changed",
-        "    because maze_table.csv is missing",
-        "    changed  maze_fig .png .svg",
-        "    missing  maze_table .csv",
+        "    because fig.png is changed",
+        "    because table.csv is missing",
+        "    changed  fig .csv .png .svg",
+        "    missing  table .csv .md",
     ]
 
 
@@ -120,15 +123,15 @@ def test_outputs_without_a_record_are_stale(project: Path) -> None:
     """Files that nobody knows how they were made are never called fresh."""
     write(project)
     run(project, "maze")
-    (project / "figures" / "provenance.json").write_text("{")
+    (project / "figures" / "maze" / "provenance.json").write_text("{")
     assert lines(project)[1] == "    because there is no record of how they were made"
     run(project, "maze")
-    (project / "figures" / "maze.ipynb").unlink()
-    assert lines(project)[1] == "    because maze.ipynb is missing"
+    (project / "figures" / "maze" / "notebook.ipynb").unlink()
+    assert lines(project)[1] == "    because notebook.ipynb is missing"
 
 
 def test_notebooks_have_states_of_their_own(project: Path) -> None:
-    """Only what is due is in the command, and a shared file that was merged is still fresh."""
+    """Only what is due is in the command, and each notebook is judged alone."""
     write(project)
     write(project, "open")
     run(project, "maze")
@@ -147,8 +150,8 @@ def test_notebooks_have_states_of_their_own(project: Path) -> None:
 
 def test_many_reasons_are_cut_short(project: Path) -> None:
     """Up to six reasons are shown, and of more the first five and their number."""
-    assert status._reasons(list("abcdef")) == list("abcdef")
-    assert status._reasons(list("abcdefgh")) == [*"abcde", "3 more"]
+    assert status._shortened(list("abcdef")) == list("abcdef")
+    assert status._shortened(list("abcdefgh")) == [*"abcde", "3 more"]
 
 
 @pytest.mark.parametrize(
@@ -169,7 +172,7 @@ def test_age_is_never_negative(project: Path, seconds: float, age: str) -> None:
     """However the clock was set, the age of a run reads well."""
     write(project)
     run(project, "maze")
-    file = project / "done" / "run.json"
+    file = project / "figures" / RUNS
     runs = json.loads(file.read_text())
     then = datetime.datetime.now(datetime.UTC) - datetime.timedelta(seconds=seconds)
     runs["maze"] |= {"finished": then.isoformat(), "seconds": 754.4}
@@ -180,14 +183,14 @@ def test_age_is_never_negative(project: Path, seconds: float, age: str) -> None:
 def test_the_commands_have_the_options_of_the_question(project: Path) -> None:
     """What is recommended for other outputs than the default ones names these."""
     write(project)
-    runs = prepare([project / "maze.ipynb"], profile="paper")
+    runs = prepared(project, "maze")
     options = ["--profile", "quick", "--out", "my figures"]
-    found = status_lines(runs, project / "figures", project / "done", options)
+    found = status_lines(runs, project / "figures", options)
     command = "replicate run maze --profile quick --out 'my figures'"
     assert found[-1] == f"to bring figures up to date: {command}"
     run(project, "maze")
-    runs = prepare([project / "maze.ipynb"], profile="paper")
-    found = status_lines(runs, project / "figures", project / "done", options)
+    runs = prepared(project, "maze")
+    found = status_lines(runs, project / "figures", options)
     command = "replicate verify --profile quick --out 'my figures'"
     assert found[-1] == f"everything is fresh; {command} proves it"
 
@@ -205,20 +208,91 @@ def test_a_notebook_that_is_gone_is_named(project: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    "entry", ["3", "{}", '{"seconds": 1}', '{"seconds": "x", "finished": "y"}', "null"]
-)
-def test_what_is_badly_remembered_is_forgotten(project: Path, entry: str) -> None:
-    """A line of run.json that lacks what is shown counts as a run that did not finish."""
-    write(project)
-    run(project, "maze")
-    (project / "done" / "run.json").write_text(f'{{"maze": {entry}}}')
-    assert lines(project)[:2] == ["maze: stale", "    because its last run did not finish"]
-
-
-def test_what_this_repository_publishes_is_fresh(tmp_path: Path) -> None:
+def test_what_this_repository_publishes_is_fresh() -> None:
     """In a fresh clone, in which nothing has run, every figure and table is up to date."""
     notebooks = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
-    runs = prepare(notebooks, profile="paper")
-    found = status_lines(runs, files.PROJECT / "figures", tmp_path)
+    figures = files.PROJECT / "figures"
+    found = status_lines(prepare(notebooks, profile="paper", out=figures), figures)
     assert found[-1] == "everything is fresh; replicate verify proves it", "\n".join(found)
+
+
+# --- clean -----------------------------------------------------------------------------------
+
+
+def cleaned(project: Path, folder: Path | None = None, *, dry_run: bool = False) -> list[str]:
+    """Clean the outputs for the notebook `maze`, and return the lines."""
+    told: list[str] = []
+    folder = folder or project / "figures"
+    clean(prepared(project, "maze"), folder, dry_run=dry_run, echo=told.append)
+    return told
+
+
+def names(folder: Path) -> set[str]:
+    """Return all files below a folder but for those that begin with a dot."""
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("[!.]*") if path.is_file()}
+
+
+@pytest.fixture
+def left(project: Path) -> Path:
+    """Run two notebooks of which one is gone afterwards, and add a file of nobody."""
+    write(project)
+    write(project, "old")
+    run(project, "maze", "old")
+    (project / "old.ipynb").unlink()
+    (project / "figures" / "maze" / "surplus.png").touch()
+    return project / "figures"
+
+
+def test_what_no_notebook_declares_goes(project: Path, left: Path) -> None:
+    """Files and folders that nobody answers for are removed; a dry run only says so."""
+    before = names(left)
+    surplus = sorted(name for name in before if name.startswith("old/"))
+    words = ["maze/surplus.png", *(name for name in surplus if MANIFEST not in name)]
+    words.append(f"old/{MANIFEST}")
+    assert cleaned(project, dry_run=True) == [f"would remove {word}" for word in words]
+    assert names(left) == before
+    assert cleaned(project) == [f"removed {word}" for word in words]
+    assert names(left) == before - {"maze/surplus.png", *surplus}
+    assert not (left / "old").exists()
+    assert cleaned(project) == []
+    assert lines(project)[-1].startswith("everything is fresh")
+
+
+def test_foreign_files_and_folders_stay(project: Path, left: Path) -> None:
+    """Trials that are stored beside the outputs, and what a user put there, are never removed."""
+    kept = {"s.sqlite", "s.sqlite.damaged-1", "mine/notes.txt", "old/mine.txt"}
+    for name in kept:
+        (left / name).parent.mkdir(exist_ok=True)
+        (left / name).touch()
+    cleaned(project)
+    assert kept < names(left)
+
+
+@pytest.mark.parametrize("content", [None, "{", '{"format": "other"}'])
+def test_a_folder_that_is_not_ours_is_refused(
+    project: Path, left: Path, content: str | None
+) -> None:
+    """Without a manifest of ours, files may be anybody's, and nothing is removed or made."""
+    folder = project / "mine"
+    (folder / "maze").mkdir(parents=True)
+    (folder / "maze" / "precious.txt").touch()
+    if content is not None:
+        (folder / "maze" / MANIFEST).write_text(content)
+    before = list(folder.rglob("*"))
+    with pytest.raises(NotebookError, match=r"mine: has no folder with a provenance\.json of ours"):
+        cleaned(project, folder)
+    assert list(folder.rglob("*")) == before
+
+
+def test_cleaning_waits_for_a_run(project: Path, left: Path) -> None:
+    """While a run has the folder, nothing is removed."""
+    before, told = names(left), list[list[str]]()
+    with (left / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        thread = threading.Thread(target=lambda: told.append(cleaned(project)))
+        thread.start()
+        time.sleep(0.3)
+        assert names(left) == before
+        assert not told
+    thread.join(timeout=60)
+    assert "removed maze/surplus.png" in told[0]

@@ -10,16 +10,9 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
-from replication.pipeline import provenance
+from replication.pipeline import inputs as inputs_module
+from replication.pipeline.inputs import Inputs, changes
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook
-from replication.pipeline.provenance import (
-    Inputs,
-    changes,
-    damaged,
-    inputs_of,
-    read_manifest,
-    record,
-)
 
 PARAMETERS = 'trials = 3\ndemos = "demos.json"\njobs = 1\nstore = "s"\nout = "build"'
 CODE = "from replication.learning.seeds import trial_seeds\nvalue = trials  # as given"
@@ -52,11 +45,16 @@ def write(project: Path) -> Write:
         cells = [new_markdown_cell(prose), new_code_cell(parameters)]
         cells[1].metadata["tags"] = ["parameters"]
         cells += [new_code_cell(source) for source in code or (CODE,)]
-        metadata = {"replication": {"outputs": ["a.csv"], "inputs": ["choices.toml"]} | declared}
+        metadata = {"replication": {"data": ["a.csv"], "inputs": ["choices.toml"]} | declared}
         nbformat.write(new_notebook(cells=cells, metadata=metadata), project / f"{name}.ipynb")
         return read_notebook(project / f"{name}.ipynb")
 
     return write
+
+
+def inputs_of(notebook: Notebook, values: dict[str, Any]) -> Inputs:
+    """Return the inputs of a notebook that needs no other."""
+    return inputs_module.inputs_of(notebook, values, notebook.path.parent / "figures")
 
 
 def known(inputs: Inputs) -> Inputs:
@@ -72,7 +70,8 @@ def test_prose_comments_and_layout_do_not_count(write: Write, project: Path) -> 
     """A reader's text, and how code and data are laid out, leave the inputs as they are."""
     before = inputs_of(write(), {})
     notebook = write(
-        '"""Why."""\nfrom replication.learning.seeds import trial_seeds  # the seeds\n\nvalue = (trials)',
+        '"""Why."""\n'
+        "from replication.learning.seeds import trial_seeds  # the seeds\n\nvalue = (trials)",
         prose="# Another headline",
         parameters=f"# So many:\n{PARAMETERS}  # a folder",
     )
@@ -116,8 +115,7 @@ def test_another_folder_does_not_count(
             ["parameter trials has changed"],
         ),
         ({"parameters": f"more = 1\n{PARAMETERS}"}, ["parameter more has changed"]),
-        ({"outputs": ["a.csv", "b.csv"]}, ["the notebook declares other outputs"]),
-        ({"merged": ["b.csv"]}, ["the notebook declares other outputs"]),
+        ({"data": ["a.csv", "b.csv"]}, ["the notebook declares other outputs"]),
         ({"inputs": []}, ["choices.toml has changed"]),
         ({"values": {"trials": 9}}, ["parameter trials has changed"]),
         ({"choices.toml": "a = 2\nb = 2"}, ["choices.toml has changed"]),
@@ -190,137 +188,24 @@ def test_missing_data_is_the_users_mistake(write: Write, project: Path) -> None:
         inputs_of(write(), {})
 
 
-# --- the manifest ----------------------------------------------------------------------------
+def test_tables_of_needed_notebooks_count(write: Write, project: Path) -> None:
+    """All CSV files of a needed notebook are inputs, under names without the folder's place."""
+    parameters = f'{PARAMETERS}\nresults = "figures"'
+    notebook = write(parameters=parameters, needs=["maze"])
+    folder = project / "elsewhere" / "maze"
+    folder.mkdir(parents=True)
+    for name in ("trials.csv", "fig.csv", "fig.png"):
+        (folder / name).write_text("1")
+    before = inputs_module.inputs_of(notebook, {}, folder.parent)
+    assert {"maze/fig.csv", "maze/trials.csv"} < set(before["data"])
+    assert "maze/fig.png" not in before["data"]
+    (folder / "fig.png").write_text("2")
+    (folder / "trials.csv").write_text("2")
+    now = inputs_module.inputs_of(notebook, {"results": "there"}, folder.parent)
+    assert changes(known(before), now) == ["maze/trials.csv has changed"]
 
 
-def test_equal_runs_have_equal_manifests(write: Write, project: Path) -> None:
-    """The same outputs in another folder, later, give the same bytes, in any order of notebooks."""
-    texts = []
-    for number, order in enumerate((("one", "two"), ("two", "one"), ("one", "one", "two"))):
-        folder = project / f"out-{number}"
-        folder.mkdir()
-        for name in order:
-            (folder / f"{name}.csv").write_text(name)
-            (folder / f"{name}.ipynb").write_text("executed")
-            notebook = write(name=name, outputs=[f"{name}.csv"])
-            record(folder, notebook, inputs_of(notebook, {"jobs": number + 1}), {})
-        texts.append((folder / provenance.MANIFEST).read_text())
-        assert str(project) not in texts[-1]
-    assert texts[0] == texts[1] == texts[2]
-    assert list(read_manifest(folder)) == ["one", "two"]
-    assert changes(read_manifest(folder)["two"]["inputs"], inputs_of(notebook, {})) == []
-
-
-def merge(folder: Path, notebook: Notebook) -> None:
-    """Let a notebook add its row to a merged file, write its own one, and be recorded."""
-    rows = folder / "rows.csv"
-    shared = {rows.name: provenance.file_hash(rows)} if rows.exists() else {}
-    (folder / f"{notebook.name}.csv").write_text(notebook.name)
-    with rows.open("a") as file:
-        file.write(notebook.name)
-    (folder / notebook.executed).touch()
-    record(folder, notebook, inputs_of(notebook, {}), shared)
-
-
-def lost(folder: Path) -> dict[str, dict[str, str]]:
-    """Return the outputs of each notebook that are damaged."""
-    return {name: damaged(folder, entry) for name, entry in read_manifest(folder).items()}
-
-
-def test_a_merged_file_changes_for_all_that_share_it(write: Write, project: Path) -> None:
-    """After one notebook has replaced its rows, the file is not damaged for the others."""
-    for name in ("one", "two", "one"):
-        merge(project, write(name=name, outputs=[f"{name}.csv"], merged=["rows.csv"]))
-    assert lost(project) == {"one": {}, "two": {}}
-    (project / "rows.csv").write_text("mine")
-    (project / "one.csv").unlink()
-    assert lost(project) == {
-        "one": {"one.csv": "missing", "rows.csv": "changed"},
-        "two": {"rows.csv": "changed"},
-    }
-
-
-@pytest.mark.parametrize("how", ["deleted", "edited"])
-def test_lost_rows_are_missed_until_they_are_made_again(
-    write: Write, project: Path, how: str
-) -> None:
-    """A merged file that was damaged is sound again only for a notebook that has run since."""
-    notebooks = {
-        name: write(name=name, outputs=[f"{name}.csv"], merged=["rows.csv"])
-        for name in ("one", "two", "three")
-    }
-    for notebook in notebooks.values():
-        merge(project, notebook)
-    rows = project / "rows.csv"
-    if how == "deleted":
-        rows.unlink()
-    else:
-        rows.write_text("mine")
-    changed = {"rows.csv": "changed"}
-    merge(project, notebooks["one"])
-    assert lost(project) == {"one": {}, "two": changed, "three": changed}
-    merge(project, notebooks["three"])
-    assert lost(project) == {"one": {}, "two": changed, "three": {}}
-    merge(project, notebooks["two"])
-    assert lost(project) == {"one": {}, "two": {}, "three": {}}
-
-
-@pytest.mark.parametrize(
-    "entry",
-    [
-        "3",
-        "[]",
-        "{}",
-        '{"inputs": {}, "outputs": {}}',
-        '{"inputs": {"parameters": {}, "data": {}, "source": {}}}',
-        '{"inputs": {"parameters": {}, "data": {}, "source": []}, "outputs": {}}',
-        '{"inputs": {"parameters": {}, "data": {}, "source": {}}, "outputs": [1]}',
-    ],
-)
-def test_an_entry_that_cannot_be_used_counts_as_none(
-    write: Write, project: Path, entry: str
-) -> None:
-    """One notebook's entry that lacks a part is left out, and the others stay."""
-    (project / "a.csv").touch()
-    (project / "toy.ipynb").touch()
-    record(project, write(), inputs_of(write(), {}), {})
-    path = project / provenance.MANIFEST
-    document = json.loads(path.read_text())
-    document["notebooks"]["other"] = json.loads(entry)
-    path.write_text(json.dumps(document))
-    assert list(read_manifest(project)) == ["toy"]
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        None,
-        b"",
-        b"{",
-        b"\xff",
-        b"[]",
-        b"3",
-        b"{}",
-        b'{"format": "replication-provenance", "version": 1}',
-        b'{"format": "replication-provenance", "version": 1, "notebooks": 3}',
-        b'{"format": "replication-provenance", "version": 2, "notebooks": {"a": {}}}',
-        b'{"format": "other", "version": 1, "notebooks": {"a": {}}}',
-    ],
-)
-def test_a_manifest_that_cannot_be_read_counts_as_none(
-    write: Write, project: Path, content: bytes | None
-) -> None:
-    """Whatever the file holds, its outputs are unknown; the next run writes a new one."""
-    if content is not None:
-        (project / provenance.MANIFEST).write_bytes(content)
-    assert read_manifest(project) == {}
-    (project / "a.csv").touch()
-    record(project, write(), inputs_of(write(), {}), {})
-    assert list(read_manifest(project)) == ["toy"]
-
-
-def test_versions_are_named_in_neutral_words() -> None:
-    """Python, platform and the packages that compute are named, and no machine."""
-    found = provenance.versions()
-    assert {"python", "platform", "numpy", "numba", "pymunk"} <= set(found)
-    assert all(isinstance(value, str) and "/" not in value for value in found.values())
+def test_the_code_of_agents_counts(write: Write) -> None:
+    """Modules that are only named, and imported when they are needed, are inputs, too."""
+    found = inputs_of(write("from replication.trials.run import run_trials"), {})["source"]
+    assert {"replication.trials.maze_agent", "replication.trials.soccer_agent"} <= found.keys()

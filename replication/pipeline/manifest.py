@@ -1,0 +1,162 @@
+"""What came out of a run: a manifest in each notebook's folder, and whether it is up to date.
+
+The manifest `provenance.json` is the same for identical runs. It holds the hashes of everything
+that the outputs depend on, and of the outputs. What differs from run to run, such as times, is
+recorded in `.runs.json` in the folder above, which is not published.
+"""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import json
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from replication.files import write_file
+from replication.pipeline.inputs import Inputs, changes, file_hash, text_hash
+from replication.pipeline.notebook import EXECUTED, INJECTED, MANIFEST
+
+FORMAT, VERSION = "replication-provenance", 2
+
+RUNS = ".runs.json"
+"""The runs on this machine, in the folder that holds the notebooks' folders."""
+
+REPORTED = ("matplotlib", "numba", "numpy", "pandas", "pymunk", "scipy")
+"""Packages whose versions are named in the manifest; the lock's hash covers all."""
+
+FRESH, STALE, MISSING = "fresh", "stale", "missing"
+
+
+@dataclass(frozen=True)
+class State:
+    """Whether outputs are up to date: `kind` is "fresh", "stale" or "missing"; `why` says why."""
+
+    kind: str
+    why: tuple[str, ...] = ()
+
+
+def state_of(folder: Path, inputs: Inputs) -> State:
+    """Return whether the outputs in a notebook's folder came from these inputs and are whole."""
+    manifest = read_manifest(folder)
+    if not manifest:
+        if not folder.is_dir() or not any(folder.iterdir()):
+            return State(MISSING)
+        return State(STALE, ("there is no record of how they were made",))
+    lost = damaged(folder, manifest)
+    if len(lost) == len(manifest["outputs"]) and set(lost.values()) == {"missing"}:
+        return State(MISSING)
+    why = changes(manifest["inputs"], inputs) + [f"{name} is {how}" for name, how in lost.items()]
+    return State(STALE, tuple(why)) if why else State(FRESH)
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a notebook's folder; empty if there is none that can be used."""
+    try:
+        document = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        parts = [document["outputs"], *(document["inputs"][k] for k in ("parameters", "data"))]
+        parts.append(document["inputs"]["source"])
+        if (document["format"], document["version"]) != (FORMAT, VERSION):
+            return {}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return dict(document) if all(isinstance(part, dict) for part in parts) else {}
+
+
+def published_folders(out: Path) -> dict[str, dict[str, Any]]:
+    """Return the manifests of all notebooks' folders in `out`, by name."""
+    if not out.is_dir():
+        return {}
+    found = {path.name: read_manifest(path) for path in sorted(out.glob("[!.]*"))}
+    return {name: manifest for name, manifest in found.items() if manifest}
+
+
+def write_manifest(folder: Path, inputs: Inputs, names: tuple[str, ...]) -> None:
+    """Record what the outputs in a folder came from."""
+    save_manifest(
+        folder, {"inputs": inputs, "outputs": hashes(folder, names), "versions": versions()}
+    )
+
+
+def save_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Write a manifest."""
+    document = {**manifest, "format": FORMAT, "version": VERSION}
+    text = json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False)
+    write_file(folder / MANIFEST, text + "\n")
+
+
+def hashes(folder: Path, names: tuple[str, ...]) -> dict[str, str]:
+    """Return the hash of each file, by name."""
+    return {name: output_hash(folder / name) for name in sorted(names)}
+
+
+def output_hash(path: Path) -> str:
+    """Return the hash of a published file; of the executed notebook, that of what a run gives.
+
+    These are the outputs of its code cells and the injected parameters. Text, code and the version
+    of Python are not among them: text is brought up to date without a run.
+    """
+    if path.name != EXECUTED:
+        return file_hash(path)
+    try:
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        given = [
+            [
+                "".join(cell["source"]) if INJECTED in cell["metadata"].get("tags", ()) else "",
+                cell["execution_count"],
+                cell["outputs"],
+            ]
+            for cell in cells
+            if cell["cell_type"] == "code"
+        ]
+    except (ValueError, KeyError, TypeError):
+        return "no notebook"
+    return text_hash(json.dumps(given, sort_keys=True))
+
+
+def damaged(folder: Path, manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Return the outputs in a manifest that are "missing" or "changed" since the run, by name."""
+    found = {}
+    for name, expected in manifest["outputs"].items():
+        if not (folder / name).is_file():
+            found[name] = "missing"
+        elif output_hash(folder / name) != expected:
+            found[name] = "changed"
+    return found
+
+
+def versions() -> dict[str, str]:
+    """Return what a run ran on, in neutral words."""
+    found = {name: importlib.metadata.version(name) for name in REPORTED}
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return {"python": python, "platform": f"{platform.system()} {platform.machine()}", **found}
+
+
+def read_runs(out: Path) -> dict[str, Any]:
+    """Return the record of the last run of each notebook on this machine, by name.
+
+    What cannot be read counts as not recorded.
+    """
+    try:
+        runs = dict(json.loads((out / RUNS).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}
+    return {name: entry for name, entry in runs.items() if _is_run(entry)}
+
+
+def record_run(out: Path, name: str, entry: Mapping[str, Any]) -> None:
+    """Record a notebook's last run."""
+    runs = read_runs(out) | {name: dict(entry)}
+    write_file(out / RUNS, json.dumps(runs, indent=1, sort_keys=True) + "\n")
+
+
+def _is_run(entry: Any) -> bool:
+    try:
+        float(entry["seconds"])
+        return datetime.datetime.fromisoformat(entry["finished"]).tzinfo is not None
+    except (KeyError, TypeError, ValueError):
+        return False

@@ -1,0 +1,175 @@
+"""Kills and interruptions: nothing is lost or computed twice, and no process stays."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from replication.files import PROJECT
+from tests.faults.checkout import (
+    TASKS,
+    TRIALS,
+    Checkout,
+    Ended,
+    Reference,
+    alive,
+    drafts,
+    gone,
+    notebook,
+    wait,
+)
+
+
+def _kill(checkout: Checkout, rng: np.random.Generator, seconds: float) -> None:
+    """Kill a run at a random moment: its parent alone, its process group, or all at once."""
+    process = checkout.start("run", "--jobs", "2")
+    time.sleep(seconds * rng.uniform(0.3, 1.05))
+    what = rng.integers(3)
+    if what == 0:
+        process.kill()
+    elif what == 1:
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        for pid in alive(checkout.mark):
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+    process.communicate(timeout=60)  # until nobody holds the pipes
+    # Orphans notice within seconds, and publish nothing.
+    figures = checkout.folder / "figures"
+    before = sorted(figures.rglob("[!.]*"))
+    assert gone(checkout.mark)
+    assert sorted(figures.rglob("[!.]*")) == before
+
+
+def _killed(folder: Path, reference: Reference, *, kills: int, seed: int) -> None:
+    checkout = Checkout(folder)
+    checkout.environment["TOY_PAUSE"] = "0.1"
+    rng = np.random.default_rng(seed)
+    seen: set[str] = set()
+    for _ in range(kills):
+        _kill(checkout, rng, reference.seconds)
+        assert checkout.stored >= seen
+        seen = checkout.stored
+    checkout.notes.unlink(missing_ok=True)
+    ended = checkout.run("run", "--jobs", "2")
+    assert checkout.results() == reference.results
+    assert len(checkout.stored) == TASKS * TRIALS
+    assert not seen & set(checkout.computed)
+    if "fresh" not in ended.out:  # the last kill may have come too late
+        assert len(checkout.computed) == TASKS * TRIALS - len(seen)
+    assert drafts(checkout.folder / "figures", checkout.folder / "build") == []
+    assert "fresh" in checkout.run("run").out
+
+
+def test_kills_lose_and_repeat_nothing(tmp_path: Path, reference: Reference) -> None:
+    """After five kills a run gives the undisturbed bytes and computes only what was not stored."""
+    _killed(tmp_path / "checkout", reference, kills=5, seed=1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(20))
+def test_a_hundred_kills_lose_and_repeat_nothing(
+    tmp_path: Path, reference: Reference, seed: int
+) -> None:
+    """The same for a hundred kills, in twenty series of five."""
+    _killed(tmp_path / "checkout", reference, kills=5, seed=100 + seed)
+
+
+def test_a_killed_kernel_is_named(checkout: Checkout) -> None:
+    """A kernel that is killed is reported with its likely cause, and earlier outputs stay."""
+    kill = "if trials < 0: import os; os.kill(os.getpid(), 9)"
+    write = "from pathlib import Path\n(Path(out) / 'a.txt').write_text(str(trials))"
+    notebook(checkout.folder / "notebooks" / "toy.ipynb", write, kill, data=["a.txt"])
+    checkout.run("run", "--out", "here")
+    error = checkout.run("run", "--out", "here", "-p", "trials", "-1", code=1).error
+    assert re.search(
+        r"toy\.ipynb: cell 3: the kernel was killed, perhaps for want of memory", error
+    )
+    assert (checkout.folder / "here" / "toy" / "a.txt").read_text() == str(TRIALS)
+    assert drafts(checkout.folder / "here") == []
+
+
+def test_a_cell_over_its_time_is_named(checkout: Checkout) -> None:
+    """A cell that takes too long is ended and named, with the way to allow it more."""
+    path = checkout.folder / "notebooks" / "toy.ipynb"
+    notebook(path, "import time\ntime.sleep(60)", data=[])
+    error = checkout.run("run", "--timeout", "8", code=1).error
+    assert error.endswith("cell 2 took more than 8 seconds; allow more with --timeout")
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_keeps_what_is_finished(
+    checkout: Checkout, reference: Reference, times: int
+) -> None:
+    """Ctrl-C, also an impatient one, has one line and code 130; the same command goes on."""
+    checkout.gate.touch()
+    process = checkout.start("run", "--jobs", "2")
+    assert wait(lambda: checkout.stored, 300)
+    for _ in range(times):
+        os.killpg(process.pid, signal.SIGINT)
+        time.sleep(0.2)
+    said, complained = process.communicate(timeout=60)
+    assert process.returncode == 130
+    error = Ended(said, complained).error
+    assert "finished notebooks and trials are kept" in error
+    assert "the same command goes on from there" in error
+    assert "Traceback" not in complained
+    assert gone(checkout.mark)
+    assert [path.name for path in (checkout.folder / "figures").iterdir()] == [".lock"]
+    assert not list(checkout.scratch.glob("replicate-*"))
+    kept = checkout.stored
+    assert 0 < len(kept) < TASKS * TRIALS
+    checkout.notes.unlink()
+    checkout.gate.unlink()
+    checkout.run("run", "--jobs", "2")
+    assert checkout.results() == reference.results
+    assert len(checkout.computed) == TASKS * TRIALS - len(kept)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
+    """However verify is ended, so are the processes that compute for it."""
+    demos = PROJECT / "data" / "demos" / "open_maze.json"
+    shutil.copy2(demos, checkout.folder / "data" / "demos")
+    rows = [f"open-maze,unified,printed,none,{k},1,9,1,9,sha256:0\n" for k in range(2000)]
+    (checkout.folder / "figures" / "open_maze").mkdir(parents=True)
+    (checkout.folder / "figures" / "open_maze" / "trials.csv").write_text(
+        "task,method,reading,set,trial,seed,iterations,converged,steps,digest\n" + "".join(rows)
+    )
+    process = checkout.start("verify", "--jobs", "2")
+    assert wait(lambda: len(alive(checkout.mark)) >= 3, 300)
+    process.send_signal(number)
+    complained = process.communicate(timeout=60)[1]
+    if number == signal.SIGKILL:
+        assert process.returncode == -signal.SIGKILL
+    else:
+        assert process.returncode == 130
+        assert complained == "error: interrupted\n"
+    assert gone(checkout.mark)
+
+
+def test_a_second_run_waits_for_the_first(checkout: Checkout, reference: Reference) -> None:
+    """Of two runs at once, the second says that it waits, and then finds everything fresh."""
+    checkout.gate.touch()
+    first = checkout.start("run")
+    assert wait(lambda: checkout.computed, 300)
+    second = checkout.start("run")
+    assert second.stdout is not None
+    waits = second.stdout.readline()
+    assert re.fullmatch(r"another run writes to .*: waiting until it ends\n", waits)
+    checkout.gate.unlink()
+    said = [process.communicate(timeout=300)[0] for process in (first, second)]
+    assert (first.returncode, second.returncode) == (0, 0)
+    assert "waiting" not in said[0]
+    assert said[1].startswith("toy: fresh, nothing to do\n")
+    assert len(checkout.computed) == TASKS * TRIALS
+    assert checkout.results() == reference.results

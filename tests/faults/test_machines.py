@@ -1,0 +1,111 @@
+"""Other machines: no network, odd clocks and paths, and foreign kernels change no byte."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+from tests.faults.checkout import Checkout, Reference, listening, run_first
+
+GUARD = """
+import os, sys
+
+def guard(event, given):
+    if event in ("socket.connect", "socket.bind", "socket.sendto"):
+        address = given[1]
+        local = ("127.", "::1", "localhost")
+        if isinstance(address, tuple) and not str(address[0]).startswith(local):
+            refused(event, address)
+    elif event in ("socket.getaddrinfo", "socket.gethostbyname"):
+        if given[0] not in (None, "127.0.0.1", "localhost", "::1", b"127.0.0.1", b"localhost"):
+            refused(event, given)
+
+def refused(event, given):
+    with open(os.environ["GUARD_LOG"], "a") as log:
+        log.write(f"{event} {given}\\n")
+    raise OSError("there is no network")
+
+sys.addaudithook(guard)
+"""
+
+
+def test_no_network_is_used(checkout: Checkout, reference: Reference) -> None:
+    """With all but loopback cut off a run is the same, and nothing listens elsewhere."""
+    log = checkout.scratch / "refused"
+    checkout.environment |= {"GUARD_LOG": str(log), "TOY_PAUSE": "0.1"}
+    run_first(checkout, GUARD)
+    process = checkout.start("run", "--jobs", "2")
+    seen: set[str] = set()
+    while process.poll() is None:
+        seen |= listening(checkout.mark)
+        time.sleep(0.1)
+    assert process.communicate()[1] is not None
+    assert process.returncode == 0
+    assert seen == {"127.0.0.1"}
+    assert not log.exists()
+    assert checkout.results() == reference.results
+
+
+CLOCK = """
+import itertools, time
+
+real, real_ns, calls = time.time, time.time_ns, itertools.count()
+time.time = lambda: real() - 3600 * (next(calls) // 5)
+time.time_ns = lambda: real_ns() - 3_600_000_000_000 * (next(calls) // 5)
+"""
+
+
+def test_a_clock_that_goes_backwards_changes_nothing(
+    checkout: Checkout, reference: Reference
+) -> None:
+    """Times decide nothing: not those of a clock that jumps back, not those of files."""
+    run_first(checkout, CLOCK)
+    checkout.run("run", "--jobs", "2")
+    assert checkout.results() == reference.results
+    for number, path in enumerate(
+        [*(checkout.folder / "figures").rglob("*"), *checkout.folder.glob("*/*.*")]
+    ):
+        os.utime(path, (0, 0) if number % 2 else (2**32, 2**32))
+    assert "toy: fresh" in checkout.run("run").out
+    assert "toy: fresh" in checkout.run("status").out
+    (checkout.folder / "figures" / "toy" / "curves.csv").write_text("other")
+    assert "curves.csv is changed" in checkout.run("status").out
+
+
+def test_paths_with_spaces_and_accents(tmp_path: Path, reference: Reference) -> None:
+    """Project, --out and demonstrations may have any name, also where the locale is C."""
+    checkout = Checkout(tmp_path / "Mes données" / "projet n° 1 – %s {x}")
+    checkout.environment |= {"LC_ALL": "C"}
+    drive = checkout.folder / "data" / "demos" / "démo à moi.json"
+    (checkout.folder / "data" / "demos" / "small.json").rename(drive)
+    out = "où ça / là"
+    checkout.run("run", "--jobs", "2", "--out", out, "-p", "demos", f"data/demos/{drive.name}")
+    for name in ("curves.csv", "trials.csv"):
+        assert (checkout.folder / out / "toy" / name).read_bytes() == reference.results[name]
+    again = checkout.run("run", "--out", out, "-p", "demos", f"data/demos/{drive.name}")
+    assert "toy: fresh" in again.out
+
+
+def test_foreign_kernels_are_not_used(checkout: Checkout, reference: Reference) -> None:
+    """Other kernels of any name, and start-up files of the user, leave a run as it is."""
+    home = checkout.scratch / "home"
+    spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
+    for place in ("path", "data", "home/.local/share/jupyter"):
+        for name in ("replication", "python3", "python"):
+            folder = checkout.scratch / place / "kernels" / name
+            folder.mkdir(parents=True)
+            (folder / "kernel.json").write_text(json.dumps(spec))
+    startup = home / ".ipython" / "profile_default" / "startup" / "00-mine.py"
+    startup.parent.mkdir(parents=True)
+    startup.write_text("raise SystemExit('foreign')")
+    checkout.environment |= {
+        "HOME": str(home),
+        "IPYTHONDIR": str(home / ".ipython"),
+        "JUPYTER_DATA_DIR": str(checkout.scratch / "data"),
+        "JUPYTER_PATH": str(checkout.scratch / "path"),
+        "JUPYTER_PREFER_ENV_PATH": "1",
+    }
+    checkout.run("run", "--jobs", "2")
+    assert checkout.results() == reference.results

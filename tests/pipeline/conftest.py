@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from replication import files
+from replication.pipeline import execute as execution
+from replication.pipeline.notebook import Notebook
+from replication.pipeline.run import Published, run_notebooks
+
+PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
+PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
+
+Write = Callable[..., Path]
+Run = Callable[..., list[Published]]
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Set up a project with a lock, a data file and no notebook."""
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
+    (tmp_path / "environment.lock").write_text("numpy==1")
+    (tmp_path / "data.toml").write_text("a = 1")
+    return tmp_path
+
+
+@pytest.fixture
+def write(project: Path) -> Write:
+    """Write a notebook: a headline, the parameters cell, PRELUDE and more code cells."""
+
+    def write(
+        *code: str,
+        name: str = "toy",
+        parameters: str = PARAMETERS,
+        prose: str = "# Toy",
+        **declared: Any,
+    ) -> Path:
+        sources = (parameters, PRELUDE, *code)
+        cells = [new_markdown_cell(prose, id="head")]
+        cells += [new_code_cell(source, id=f"code-{at}") for at, source in enumerate(sources)]
+        cells[1].metadata["tags"] = ["parameters"]
+        node = new_notebook(cells=cells, metadata={"replication": declared})
+        nbformat.write(node, project / f"{name}.ipynb")
+        return project / f"{name}.ipynb"
+
+    return write
+
+
+@pytest.fixture
+def run(project: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run notebooks into `figures`; no temporary file or draft may be left."""
+    scratch = project / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+
+    def run(*notebooks: Path, **options: Any) -> list[Published]:
+        out = options.setdefault("out", project / "figures")
+        defaults: dict[str, Any] = {"profile": "paper", "jobs": 1}
+        try:
+            return run_notebooks(notebooks, **defaults | options)
+        finally:
+            assert not list(scratch.iterdir())
+            assert not list(out.glob(".draft-*")) + list(out.glob(".aside-*"))
+
+    return run
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Run notebooks in this process, which is fast; return the names of those that began."""
+    begun: list[str] = []
+
+    def execute(notebook: Notebook, values: Mapping[str, Any], stage: Path, **_: Any) -> str:
+        begun.append(notebook.name)
+        names: dict[str, Any] = {}
+        node = notebook.load()
+        for at, cell in enumerate(node.cells):
+            if cell.cell_type == "code":
+                cell.execution_count = at
+                exec(cell.source, names)
+            if at == notebook.at:
+                names |= {**values, "out": str(stage)}
+        return str(nbformat.writes(node)) + "\n"
+
+    monkeypatch.setattr(execution, "execute", execute)
+    return begun
+
+
+@pytest.fixture
+def no_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fail when anything is executed."""
+    monkeypatch.setattr(execution, "execute", lambda *_, **__: pytest.fail("was executed"))

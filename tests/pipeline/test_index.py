@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+from nbformat.v4 import new_output
+
+from replication.pipeline import execute as execution
+from replication.pipeline.index import INDEX, label, shown_outputs, write_index
+from replication.pipeline.manifest import RUNS
+from replication.pipeline.run import run_notebooks
+
+
+@pytest.fixture
+def out(write: Any, project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Publish a notebook that shows a figure and a table, and writes data."""
+
+    def execute(notebook: Any, values: Any, stage: Path, **_: Any) -> str:
+        for name in notebook.declared.outputs:
+            (stage / name).touch()
+        node = notebook.load()
+        for cell, kind, name in ((3, "figure", "fig05"), (4, "table", "sets")):
+            metadata = {"replication": {"kind": kind, "name": name}}
+            node.cells[cell].outputs = [new_output("display_data", {}, metadata=metadata)]
+        return str(nbformat.writes(node))
+
+    monkeypatch.setattr(execution, "execute", execute)
+    declared = {"figures": ["fig05"], "tables": ["sets"], "data": ["trials.csv"]}
+    path = write("1", "2", prose="# Toy\n\n## Which mistakes help", **declared)
+    run_notebooks([path], profile="paper", out=project / "figures", seed=None, jobs=1)
+    return project / "figures"
+
+
+def rows(out: Path) -> list[list[str]]:
+    """Return the cells of the table's rows."""
+    lines = (out / INDEX).read_text().splitlines()
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "](" in line]
+
+
+def test_each_output_has_a_row(out: Path) -> None:
+    """What is shown stands in the notebook's order, with its files; what is not shown follows."""
+    assert [row[0] for row in rows(out)] == ["Fig. 5", "Which mistakes help", "trials"]
+    links = "[csv](toy/fig05.csv), [png](toy/fig05.png), [svg](toy/fig05.svg)"
+    assert rows(out)[0][1:] == [links, "[toy](toy/notebook.ipynb)", "seed 1, trials 3", "0 s"]
+
+
+def test_a_run_time_is_kept_where_none_is_recorded(out: Path) -> None:
+    """A fresh clone does not know how long a run took, but the page does."""
+    record = json.loads((out / RUNS).read_text())
+    record["toy"]["seconds"] = 754.4
+    (out / RUNS).write_text(json.dumps(record))
+    write_index(out)
+    assert {row[4] for row in rows(out)} == {"13 min"}
+    (out / RUNS).unlink()
+    write_index(out)
+    assert {row[4] for row in rows(out)} == {"13 min"}
+    (out / INDEX).unlink()
+    write_index(out)
+    assert {row[4] for row in rows(out)} == {""}
+
+
+def test_a_page_that_is_right_is_not_written(out: Path) -> None:
+    """Nothing is written where nothing has changed."""
+    before = (out / INDEX).stat().st_mtime_ns
+    write_index(out)
+    assert (out / INDEX).stat().st_mtime_ns == before
+
+
+def test_what_is_shown_comes_with_its_heading(out: Path) -> None:
+    """The nearest heading above an output is its own."""
+    shown = [(entry["name"], heading) for entry, heading in shown_outputs(out / "toy")]
+    assert shown == [("fig05", "Which mistakes help"), ("sets", "Which mistakes help")]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("fig12", "Fig. 12"), ("table1", "Table I"), ("table4", "Table IV"), ("figure", "figure")],
+)
+def test_names_of_the_paper_are_read(name: str, text: str) -> None:
+    """A figure or table of the paper has the paper's name."""
+    assert label(name, "") == text
