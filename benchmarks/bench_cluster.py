@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from replication.evidence.experiments import EXPERIMENTS
+from replication.progress import SCHEDULER
 from replication.trials.condition import Condition
-from replication.trials.run import SCHEDULER, run_trials
+from replication.trials.run import run_trials
 from replication.trials.store import Store
 
 # distributed leaves sockets to the garbage collector

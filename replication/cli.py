@@ -229,7 +229,8 @@ def run(
     click.echo(f"\noutputs ({len(new)} new): {_short(target)}")
     verdicts = target / "claims" / "verdicts.csv"
     if any(path.stem == "claims" for path in paths) and verdicts.exists():
-        from replication.evidence.tables import read_table, verdict_lines
+        from replication.evidence.tables import read_table
+        from replication.report.readable import verdict_lines
 
         click.echo("\nThe paper's claims:\n" + "\n".join(verdict_lines(read_table(verdicts))))
     changed = [_short(file) for notebook in published for file in notebook.changed]
@@ -408,7 +409,7 @@ def learn(
     from replication.fit import fit
     from replication.irl import get_method
     from replication.paper.params import Params
-    from replication.report import figures, style
+    from replication.report import maze, style
 
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
@@ -421,7 +422,7 @@ def learn(
     result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
     saved = result.save(f"{stem}.json")
-    style.save_figure(figures.fit_figure(result), stem, formats=("png",))
+    style.save_figure(maze.fit_figure(result), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     click.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "

@@ -45,6 +45,7 @@ from replication import load_demos
 from replication.paper.params import Params
 from replication.trials import run as computing
 from replication.trials.condition import Condition
+from replication.trials.measures import measure_trials
 from replication.trials.store import Store
 
 compute = computing.compute
@@ -72,7 +73,7 @@ results = computing.run_trials(conditions, trials=trials, store=Store(store), jo
 errors = [d for condition in conditions for d in results.errors(condition).ravel().tolist()]
 rows = [d.hex() for d in errors]
 (Path(out) / "curves.csv").write_text("\\n".join(rows))
-results.frame().to_csv(Path(out) / "trials.csv", index=False)
+measure_trials(results, conditions).to_csv(Path(out) / "trials.csv", index=False)
 print(len(rows), "numbers in", out)
 """,
 )
