@@ -60,13 +60,18 @@ class OneLineErrors(click.Group):
             _end(f"{error.format_message().rstrip('.')}{more}", error.exit_code)
         except UserError as error:
             _end(str(error))
-        except (KeyboardInterrupt, click.Abort):
-            _end("interrupted", 130)
         except OSError as error:
             if error.filename is None:
                 raise
             _end(f"{error.filename}: {(error.strerror or str(error)).lower()}")
         sys.exit(code if isinstance(code, int) else 0)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; click itself would report an interruption in two lines."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            _end("interrupted", 130)
 
 
 def _end(message: str, code: int = 2) -> NoReturn:

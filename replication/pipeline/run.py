@@ -226,11 +226,11 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
             write_manifest(stage, run.inputs, notebook.published)
             differ = differing(stage, run.folder, notebook.published)
             swap(stage, run.folder)
-            seconds = round(time.monotonic() - began, 1)
-            record_run(run.out, run.name, _where() | {"seconds": seconds, "finished": _now()})
         except OSError as error:
             reason = error.strerror or str(error)  # the path of a draft would not help the user
             raise RunError(f"{notebook.path}: cannot publish to {run.out}: {reason}") from error
+    seconds = round(time.monotonic() - began, 1)
+    record_run(run.out, run.name, _where() | {"seconds": seconds, "finished": _now()})
     failed.unlink(missing_ok=True)
     number = len(notebook.declared.outputs)
     compared = "" if differ is None else "; all bytes as before"

@@ -65,7 +65,7 @@ def test_every_write_may_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "environment.lock").touch()
     words = ["run"]
     assert CliRunner().invoke(cli.app, words).exit_code == 0
-    write_bytes, left = Path.write_bytes, [0]
+    write_bytes, left, before = Path.write_bytes, [0], "old"
 
     def full(path: Path, data: bytes) -> int:
         left[0] -= 1
@@ -83,11 +83,12 @@ def test_every_write_may_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
             break
         assert "Traceback" not in result.output
         assert re.fullmatch(r"error: .*no space left on device\n", result.stderr, re.IGNORECASE)
-        assert (tmp_path / "figures" / "toy" / "a.txt").read_text() in ("old", content["text"])
+        left_over = (tmp_path / "figures" / "toy" / "a.txt").read_text()
+        assert left_over in (before, content["text"])
         assert drafts(tmp_path / "figures", tmp_path / "build") == []
-        content["text"] = "old"
+        content["text"] = before = left_over
         assert CliRunner().invoke(cli.app, words).exit_code == 0
-        assert (tmp_path / "figures" / "toy" / "a.txt").read_text() == "old"
+        assert (tmp_path / "figures" / "toy" / "a.txt").read_text() == before
         assert "fresh" in CliRunner().invoke(cli.app, words).stdout
     assert allowed >= 3
 
