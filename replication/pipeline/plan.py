@@ -93,11 +93,9 @@ def prepare(
     runs = []
     for notebook in _ordered([read_notebook(path) for path in notebooks], out):
         values = {**notebook.declared.profiles.get(profile, {}), **(parameters or {})}
-        if jobs is not None:
-            values.setdefault("jobs", jobs)
-        elif "jobs" in notebook.literals:
-            values.setdefault("jobs", joblib.cpu_count())
-        if seed is not None:
+        if "jobs" in notebook.literals:
+            values.setdefault("jobs", joblib.cpu_count() if jobs is None else jobs)
+        if seed is not None and "seed" in notebook.literals:
             values["seed"] = seed
         notebook.check(values)
         runs.append(Run(notebook, values, inputs_of(notebook, values, out), out))
