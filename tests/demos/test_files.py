@@ -226,7 +226,7 @@ def test_saving_refuses_what_cannot_be_read(tmp_path: Path) -> None:
     [
         ({"task": ...}, "the field 'task' is missing; add it"),
         ({"environment.goal": [1, 1]}, "environment: 'goal' is [1, 1], but"),
-        ({"correct.0.actions.1": "dwon"}, "step 2 of demo 'c': unknown action 'dwon'; did you me"),
+        ({"correct.0.actions.1": "dwon"}, "step 2 of demo 'c': unknown action 'dwon' (did you me"),
         ({"correct.0.states.2": [0, 2]}, "'down' from [0,1] leads to [1,1], but the file claims"),
         ({"correct.0.states.0": [1, 0]}, "demo 'c' starts at [1,0], but the start is [0,0]; wri"),
         ({"incorrect.0.states.1": [0, 1]}, "'up' from [0,0] hits a wall and stays, but the file"),

@@ -50,17 +50,14 @@ REFUSALS: list[tuple[Changes, str]] = [
     ({"task": "../x"}, "task: '../x' does not fit: use letters, digits, '-'"),
     (
         {"correct.0.sates": []},
-        "correct[0] (demo 'c'): unknown field 'sates'; did you mean 'states'? the fields are name",
+        "correct[0] (demo 'c'): unknown field 'sates' (did you mean 'states'?); known: name, act",
     ),
-    ({"descriptoin": ""}, "field 'descriptoin'; did you mean 'description'?"),
-    ({"environment.xyz\n": 1}, "environment: unknown field 'xyz\\n'; the fie"),
+    ({"descriptoin": ""}, "field 'descriptoin' (did you mean 'description'?"),
+    ({"environment.xyz\n": 1}, "environment: unknown field 'xyz\\n'; known: "),
     ({"incorrect.1.kind": ...}, "incorrect[1] (demo 'd'): the field 'kind' is missing; add it"),
     ({"incorrect.0.kind": "Hit!"}, "incorrect[0] (demo 'h').kind: 'Hit!' does not f"),
     ({"correct.0.kind": "correct"}, "correct[0] (demo 'c'): unknown field"),
-    (
-        {"environment.kind": "tank"},
-        "environment.kind: unknown kind 'tank'; the kinds are maze, soccer",
-    ),
+    ({"environment.kind": "tank"}, "environment.kind: unknown kind 'tank'; known: maze, soccer"),
     ({"environment": ...}, "the field 'environment' is missing"),
     (
         {"environment.map": ["S.#", "..G."]},

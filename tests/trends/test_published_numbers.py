@@ -193,6 +193,7 @@ def test_notebooks_judge_by_the_declared_seed() -> None:
     assert seeds["sensitivity"] == ROOT != seeds["calibration"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["default", "MAP=random-1"])
 def test_published_sensitivity_is_what_the_code_computes(name: str, tmp_path: Path) -> None:
     """A specification computed from nothing gives the stored effects and intervals."""
