@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from replication.demos.soccer_expert import demonstrate_soccer
+from replication import Demos
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.rules import FORWARD, SoccerParams
 from replication.learning import reference, soccer
@@ -29,9 +29,9 @@ Expert = tuple[list[tuple[int, int]], NDArray[np.float64], FastSoccerWorld]
 
 
 @pytest.fixture(scope="module")
-def expert() -> Expert:
+def expert(soccer_demos: Demos) -> Expert:
     """Return the expert's pairs, a Q that prefers them, and the world after the last of them."""
-    (correct,) = demonstrate_soccer("s").correct
+    (correct,) = soccer_demos.correct
     pairs = list(zip(correct.states.tolist(), correct.actions.tolist(), strict=False))
     q, world = np.zeros((384, 5)), FastSoccerWorld()
     for state, action in pairs:

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 import pytest
 
-from replication import Demos, load_demos
+from replication import Demos
 from replication.files import PROJECT
 from replication.irl import METHODS, Trial
 from replication.paper.params import Params
@@ -31,12 +31,6 @@ FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
 def condition(small_demos: Demos) -> Condition:
     """Return a condition that uses incorrect demonstrations."""
     return Condition(small_demos, "unified-incorrect", Params.of(**FEW, incorrect="all"))
-
-
-@pytest.fixture(scope="module")
-def soccer_demos() -> Demos:
-    """Load the stored demonstrations of soccer, where every parameter may be chosen."""
-    return load_demos(PROJECT / "data" / "demos" / "soccer.json")
 
 
 def other_value(id: str) -> Any:
@@ -198,8 +192,7 @@ def module_file(name: str) -> str:
 def keys(tmp_path_factory: pytest.TempPathFactory) -> Keys:
     """Keys of a trial in a maze (unified) and in soccer (AdaBoost-IRL), by edits of the code."""
     root = tmp_path_factory.mktemp("copy")
-    ignored = shutil.ignore_patterns("__pycache__")
-    package = Path(shutil.copytree(PACKAGE, root / "replication", ignore=ignored))
+    package = Path(shutil.copytree(PACKAGE, root / "replication"))  # with what is compiled
     computing = {module_file(name) for name in BOTH + MAZE + SOCCER + UPDATES}
     others = {path.relative_to(package).as_posix() for path in package.rglob("*.py")} - computing
     code = "\n\ndef added():\n    return 1\n"
