@@ -49,7 +49,7 @@ def test_demos_validate_themselves() -> None:
     for task, correct, incorrect, message in (
         ("t", (right, right), (), "two demos are named 'a'"),
         ("t", (bad,), (), "'b' is correct; its kind must be 'correct'"),
-        ("t", (replace(right, actions=[2], states=[0, 1]),), (), r"misses the goal \[0,2\]"),
+        ("t", (demo("a", "correct", "right", maze=maze),), (), r"misses the goal \[0,2\]"),
         ("t", (right,), (replace(bad, kind="correct"),), "'b' is incorrect, of kind 'correct'"),
         ("t", (), (), "no correct demo"),
         ("../t", (right,), (), "letters, digits"),

@@ -121,14 +121,15 @@ def test_schema_agrees_with_the_program() -> None:
     validator = jsonschema.Draft202012Validator(json_schema())
     validator.check_schema(json_schema())
     assert validator.is_valid(EXAMPLE)
-    for wrong in (
+    wrongs: tuple[Changes, ...] = (
         {"version": 2},
         {"correct": []},
         {"correct.0.sates": []},
         {"correct.0.states.1": [0, 1, 0, 0]},
         {"incorrect.0.kind": "Hit!"},
         {"incorrect.0.kind": ...},
-    ):
+    )
+    for wrong in wrongs:
         assert not validator.is_valid(edited(wrong))
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def _loop(
     *,
     mu_e: Array | None = None,
     keep: bool = False,
-    **choices: object,
+    **choices: Any,
 ) -> Loop:
     mu_e = _mu_e() if mu_e is None else mu_e
     mu_b, seed = np.zeros((5, 2), dtype=bool), np.random.SeedSequence(1)
@@ -70,7 +71,7 @@ def _loop(
     return iterate(agent, get_method(method), mu_e, mu_b, params, seed=seed, keep=keep)
 
 
-def _trial(method: str = "unified", *, keep: bool = False, **choices: object) -> Trial:
+def _trial(method: str = "unified", *, keep: bool = False, **choices: Any) -> Trial:
     agent = Corridor()
     ((position, trial),) = run(agent, [_loop(agent, method, keep=keep, **choices)])
     assert position == 0
