@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -27,18 +27,12 @@ def unknown(name: str, known: Iterable[str], what: str) -> str:
     names = list(known)
     near = difflib.get_close_matches(name[:40], names, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    return f"unknown {what} {name!r}{hint}; known: {', '.join(names)}"
+    return f"unknown {what} {show(name)}{hint}; known: {', '.join(names)}"
 
 
 def compact(value: Any) -> str:
     """Return JSON text without blanks."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
-
-
-def suggest(word: str, known: Sequence[str]) -> str:
-    """Ask whether a similar known word was meant; empty if there is none."""
-    close = difflib.get_close_matches(word[:40], known, n=1)
-    return f"did you mean {close[0]!r}? " if close else ""
 
 
 def show(value: Any) -> str:

@@ -33,6 +33,12 @@ def stored_demos(request: pytest.FixtureRequest) -> Demos:
     return load_demos(PROJECT / "data" / "demos" / f"{request.param}.json")
 
 
+@pytest.fixture(scope="session")
+def soccer_demos() -> Demos:
+    """Load the stored demonstrations of soccer."""
+    return load_demos(PROJECT / "data" / "demos" / "soccer.json")
+
+
 @pytest.fixture
 def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project in which "executing" a notebook writes each of its outputs."""

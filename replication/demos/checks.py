@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.envs.environment import Environment
-from replication.errors import UserError, compact, show, suggest
+from replication.errors import UserError, compact, show, unknown
 
 
 class DemoError(UserError):
@@ -36,10 +36,8 @@ def action_numbers(
     numbers = {action: number for number, action in enumerate(environment.actions)}
     for step, action in enumerate(actions, start=1):
         if action not in numbers:
-            raise DemoError(
-                f"step {step} of demo {show(name)}: unknown action {show(action)}; "
-                f"{suggest(action, environment.actions)}use {', '.join(environment.actions)}"
-            )
+            message = unknown(action, numbers, "action")
+            raise DemoError(f"step {step} of demo {show(name)}: {message}")
     return np.array([numbers[action] for action in actions], dtype=np.int64)
 
 

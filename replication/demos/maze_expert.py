@@ -43,7 +43,8 @@ class Expert(Chosen):
     detour_width: int = choice("DETOUR-WIDTH")
 
 
-OPPOSITE = (1, 0, 3, 2)  # of up, down, right, left
+MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1))  # up, down, right, left
+OPPOSITE = (1, 0, 3, 2)
 
 Node = tuple[int, int, int]
 """A state, the action that led there, and how often it was taken in a row."""
@@ -141,11 +142,7 @@ def incorrect_demos(maze: Maze, correct: list[int], *, params: Expert) -> Iterat
     INCORRECT-NUMBER: one of a kind for each corner where it can be driven.
     """
     corners = [t for t in range(1, len(correct)) if correct[t] != correct[t - 1]]
-    widths = {
-        "detour": params.detour_width,
-        "near-detour": 1,
-        "far-detour": max(maze.shape),
-    }
+    widths = {"detour": params.detour_width, "near-detour": 1, "far-detour": max(maze.shape)}
     back = [OPPOSITE[action] for action in reversed(correct[:-1])]
     drives: dict[str, list[list[int] | None]] = {
         "hit": [_miss(maze, correct, corner) for corner in corners],
@@ -167,13 +164,11 @@ def _drive(maze: Maze, actions: list[int], name: str, kind: str) -> Demo:
 def _miss(maze: Maze, correct: list[int], corner: int) -> list[int]:
     """Drive straight on at the corner until a move changes nothing."""
     actions = correct[:corner]
-    state = int(maze.replay(actions)[-1])
     while True:
         actions = [*actions, correct[corner - 1]]
-        there = int(maze.next_state[state, actions[-1]])
-        if there == state:
+        before, after = maze.replay(actions)[-2:]
+        if before == after:
             return actions
-        state = there
 
 
 def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int] | None:
@@ -188,8 +183,8 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
     for reach in range(width, 0, -1):
         point = (row, column)
         for action in (ahead, back):
-            for _ in range(reach):
-                point = _beside(point, action)
+            down, right = MOVES[action]
+            point = point[0] + reach * down, point[1] + reach * right
         if not all(0 <= x < size for x, size in zip(point, maze.shape, strict=True)):
             continue
         a, b, c = int(path[leave]), maze.state(*point), int(path[join])
@@ -199,11 +194,6 @@ def _detour(maze: Maze, correct: list[int], corner: int, width: int) -> list[int
         if out and home and all(b != OPPOSITE[a] for a, b in pairwise(way)):
             return correct[:leave] + way + correct[join:]
     return None
-
-
-def _beside(point: tuple[int, int], action: int) -> tuple[int, int]:
-    down, right = ((-1, 0), (1, 0), (0, 1), (0, -1))[action]
-    return point[0] + down, point[1] + right
 
 
 def _way(maze: Maze, source: int, target: int, avoid: set[int]) -> list[int] | None:

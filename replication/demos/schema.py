@@ -35,7 +35,7 @@ from replication.demos.strict_json import read_json
 from replication.envs.maze import MAX_SIDE, Maze, MazeError
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import SoccerParams
-from replication.errors import compact, show, suggest
+from replication.errors import compact, show, unknown
 
 FORMAT = "replication-demos"
 VERSION = 1
@@ -79,12 +79,7 @@ class MazeFields(_Fields):
             raise DemoError(f"environment: {error}") from None
         derived = maze.describe()
         for field in ("actions", "start", "goal"):
-            given, drawn = getattr(self, field), derived[field]
-            if given is not None and given != drawn:
-                raise DemoError(
-                    f"environment: {field!r} is {show(given)}, but should be "
-                    f"{compact(drawn)}; write that or leave it out"
-                )
+            _check_given(field, getattr(self, field), derived[field])
         return maze
 
 
@@ -111,12 +106,16 @@ class SoccerFields(_Fields):
             field = SoccerField(SoccerParams(**given))
         except ValueError as error:
             raise DemoError(f"environment: {error}") from None
-        if self.actions is not None and tuple(self.actions) != field.actions:
-            raise DemoError(
-                f"environment: 'actions' is {show(self.actions)}, but should be "
-                f"{compact(field.actions)}; write that or leave it out"
-            )
+        _check_given("actions", self.actions, list(field.actions))
         return field
+
+
+def _check_given(field: str, given: list[Any] | None, derived: list[Any]) -> None:
+    if given is not None and given != derived:
+        raise DemoError(
+            f"environment: {field!r} is {show(given)}, but should be {compact(derived)}; "
+            "write that or leave it out"
+        )
 
 
 class CorrectFields(_Fields):
@@ -184,10 +183,7 @@ def read_fields(content: bytes) -> DemoFile:
 
 
 _ENVIRONMENTS: dict[str, type[BaseModel]] = {"maze": MazeFields, "soccer": SoccerFields}
-_MODELS: dict[str, type[BaseModel]] = {
-    "correct": CorrectFields,
-    "incorrect": IncorrectFields,
-}
+_MODELS: dict[str, type[BaseModel]] = {"correct": CorrectFields, "incorrect": IncorrectFields}
 
 
 def _explain(error: ValidationError, data: dict[str, Any]) -> str:
@@ -202,20 +198,12 @@ def _explain(error: ValidationError, data: dict[str, Any]) -> str:
         return "environment: the field 'kind' is missing; add it"
     if kind == "union_tag_invalid":
         tag = data["environment"]["kind"]
-        known = tuple(_ENVIRONMENTS)
-        return (
-            f"environment.kind: unknown kind {show(tag)}; {suggest(str(tag), known)}"
-            f"the kinds are {', '.join(known)}"
-        )
+        return f"environment.kind: {unknown(str(tag), _ENVIRONMENTS, 'kind')}"
     if kind == "missing":
         return f"{_where(place[:-1], data)}the field {place[-1]!r} is missing; add it"
     if kind == "extra_forbidden":
         key, model = str(place[-1]), DemoFile if len(place) == 1 else models[str(place[0])]
-        known = tuple(model.model_fields)
-        return (
-            f"{_where(place[:-1], data)}unknown field {show(key)}; {suggest(key, known)}"
-            f"the fields are {', '.join(known)}"
-        )
+        return _where(place[:-1], data) + unknown(key, model.model_fields, "field")
     message = first["msg"][:1].lower() + first["msg"][1:]
     fix = FIXES.get(first.get("ctx", {}).get("pattern", ""), message)
     return f"{_where(place, data)}{show(first['input'])} does not fit: {fix}"

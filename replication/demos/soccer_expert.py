@@ -45,6 +45,8 @@ class SoccerExpert(Chosen):
 LONGEST = 100
 """Number of decisions after which the expert gives up a drive."""
 
+WIDTH = int(load_choices()["DETOUR-WIDTH"].default)
+
 
 def demonstrate_soccer(
     task: str,
@@ -61,7 +63,7 @@ def demonstrate_soccer(
         If the expert does not score there.
     """
     field = field or SoccerField()
-    correct = _drive(field, [], lambda world, state: expert_action(state))
+    correct = _drive(field, [], expert_action)
     if correct is None:
         raise DemoError("the expert does not score on this field; change the world's parameters")
     return Demos(
@@ -82,9 +84,9 @@ def incorrect_demos(
         leave = list(range(len(correct)))
     sides = (RIGHT, LEFT)
     drives: dict[str, list[list[int] | None]] = {
-        "hit": [_hit(field, correct[:t], side) for t in leave for side in sides],
+        "hit": [_crash(field, correct[:t], side) for t in leave for side in sides],
         "detour": [_detour(field, correct, t, side) for t in leave for side in sides],
-        "overspeed": [_overspeed(field, correct[:t]) for t in leave],
+        "overspeed": [_crash(field, correct[:t], FORWARD) for t in leave],
         "opposite": [_opposite(field, correct[:t]) for t in leave],
     }
     seen = {tuple(correct)}
@@ -97,28 +99,20 @@ def incorrect_demos(
                 yield _demo(field, actions, f"{kind}-{number}", kind)
 
 
-def _width() -> int:
-    return int(load_choices()["DETOUR-WIDTH"].default)
-
-
-def _hit(field: SoccerField, begin: list[int], side: int) -> list[int] | None:
-    return _drive(field, begin, lambda world, state: side, end_at_contact=True)
-
-
-def _overspeed(field: SoccerField, begin: list[int]) -> list[int] | None:
-    return _drive(field, begin, lambda world, state: FORWARD, end_at_contact=True)
+def _crash(field: SoccerField, begin: list[int], action: int) -> list[int] | None:
+    return _drive(field, begin, lambda state: action, at_contact="end")
 
 
 def _opposite(field: SoccerField, begin: list[int]) -> list[int]:
-    actions = [*begin, *[BACKWARD] * max(len(begin), _width())]
+    actions = [*begin, *[BACKWARD] * max(len(begin), WIDTH)]
     return actions[: field.goal_step(actions)]  # the ball may be rolling by then
 
 
 def _detour(field: SoccerField, correct: list[int], at: int, side: int) -> list[int] | None:
-    for width in range(_width(), 0, -1):
+    for width in range(WIDTH, 0, -1):
         begin = [*correct[:at], *[side] * width]
-        actions = _drive(field, begin, lambda world, state: expert_action(state))
-        if actions is not None and len(actions) > len(correct) and not _touches(field, actions):
+        actions = _drive(field, begin, expert_action, at_contact="fail")
+        if actions is not None and len(actions) > len(correct):
             return actions
     return None
 
@@ -126,30 +120,25 @@ def _detour(field: SoccerField, correct: list[int], at: int, side: int) -> list[
 def _drive(
     field: SoccerField,
     begin: list[int],
-    policy: Callable[[FastSoccerWorld, int], int],
+    policy: Callable[[int], int],
     *,
-    end_at_contact: bool = False,
+    at_contact: str = "go on",
 ) -> list[int] | None:
-    """Take actions, then follow a policy to the goal or a contact; None if it reaches neither."""
+    """Take actions, then follow a policy to the goal, or "end" at a contact; None if it fails."""
     world = FastSoccerWorld(field.params)
     state, actions = world.reset(), list[int]()
     while len(actions) < LONGEST:
-        action = begin[len(actions)] if len(actions) < len(begin) else policy(world, state)
+        action = begin[len(actions)] if len(actions) < len(begin) else policy(state)
         state, scored, timed_out = world.step(action)
         actions.append(action)
-        if scored or (end_at_contact and any(world.contacts) and len(actions) > len(begin)):
+        touched = any(world.contacts)
+        if touched and at_contact == "fail":
+            return None
+        if scored or (touched and at_contact == "end" and len(actions) > len(begin)):
             return actions
         if timed_out:
             return None
     return None
-
-
-def _touches(field: SoccerField, actions: list[int]) -> bool:
-    world = FastSoccerWorld(field.params)
-    world.reset()
-    for action in actions:
-        world.step(action)
-    return any(world.contacts)
 
 
 def _demo(field: SoccerField, actions: list[int], name: str, kind: str) -> Demo:

@@ -8,7 +8,7 @@ import os
 import stat
 from collections import Counter
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from replication.demos.checks import DemoError
 from replication.errors import clip, compact, show
@@ -18,18 +18,16 @@ MAX_FIELDS = 50
 
 
 def read_content(path: str | os.PathLike[str]) -> bytes:
-    """Return the bytes of a regular file that is not too large.
+    """Return the bytes of a regular file, at most one more than :func:`read_json` takes.
 
     Raises
     ------
     DemoError
-        If it is missing, not a regular file, too large or unreadable.
+        If it is missing, not a regular file or unreadable.
     """
     try:
-        info = Path(path).stat()
-        if not stat.S_ISREG(info.st_mode):
+        if not stat.S_ISREG(Path(path).stat().st_mode):
             raise DemoError("is not a regular file; give the path of a JSON file")
-        _check_size(info.st_size)
         with Path(path).open("rb") as file:
             return file.read(MAX_BYTES + 1)
     except DemoError:
@@ -47,7 +45,8 @@ def read_json(content: bytes) -> Any:
         If it is not UTF-8, not JSON, too large or too deep, or holds a field twice or a number
         that is not finite.
     """
-    _check_size(len(content))
+    if len(content) > MAX_BYTES:
+        raise DemoError(f"is larger than {MAX_BYTES // 1_000_000} MB; drop some demos")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -58,9 +57,9 @@ def read_json(content: bytes) -> Any:
         return json.loads(
             text,
             object_pairs_hook=_object,
-            parse_int=_integer,
-            parse_float=_float,
-            parse_constant=_constant,
+            parse_int=_number,
+            parse_float=_number,
+            parse_constant=_number,
         )
     except json.JSONDecodeError as error:
         raise DemoError(
@@ -93,11 +92,6 @@ def reason(error: Exception) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _check_size(n_bytes: int) -> None:
-    if n_bytes > MAX_BYTES:
-        raise DemoError(f"is larger than {MAX_BYTES // 1_000_000} MB; drop some demos")
-
-
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) < len(pairs):
@@ -108,18 +102,9 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return fields
 
 
-def _integer(text: str) -> int:
-    if len(text) > 16:
-        raise DemoError(f"the number {clip(text)} is too large; write a small integer")
-    return int(text)
-
-
-def _float(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise DemoError(f"the number {clip(text)} is too large; write a small number")
-    return value
-
-
-def _constant(text: str) -> NoReturn:
-    raise DemoError(f"{text} is not a JSON number; write a finite number")
+def _number(text: str) -> int | float:
+    """Read a number; NaN and infinities, which JSON lacks, come here as well."""
+    whole = text.lstrip("-").isdigit()
+    if not math.isfinite(float(text)) or (whole and len(text) > 16):
+        raise DemoError(f"the number {clip(text)} is too large or not finite; write a small number")
+    return int(text) if whole else float(text)

@@ -21,7 +21,7 @@ def test_actions_are_numbered_in_the_order_of_the_environment() -> None:
 
 def test_unknown_action() -> None:
     """An unknown action is refused with its step, the nearest known one and all known ones."""
-    message = "^step 2 of demo 'c': unknown action 'dwon'; did you mean 'down'[?] use up, down, "
+    message = r"^step 2 of demo 'c': unknown action 'dwon' \(did you mean 'down'\?\); known: up, "
     with pytest.raises(DemoError, match=message):
         action_numbers(MAZE, "c", ["up", "dwon"])
 

@@ -5,6 +5,7 @@ import json
 import os
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,47 +16,15 @@ from hypothesis import strategies as st
 
 from replication.demos.checks import DemoError, DemoWarning
 from replication.demos.files import check_demos, load_demos, save_demos
-from replication.demos.model import Demo, Demos, content_hash
-from replication.envs.maze import ACTIONS, Maze
-from replication.files import PROJECT
+from replication.demos.model import Demos, content_hash
+from replication.envs.maze import Maze
+from tests.demos.example import EXAMPLE, MAZE, STORED, Changes, demo, edited
 
-DATA = PROJECT / "data" / "demos"
-STORED = sorted(path for path in DATA.glob("*.json") if path.name != "schema.json")
-
-EXAMPLE: dict[str, Any] = {
-    "format": "replication-demos",
-    "version": 1,
-    "task": "tiny",
-    "description": "Käse\n",
-    "environment": {
-        "kind": "maze",
-        "map": ["S.#", "..G"],
-        "actions": ["up", "down", "right", "left"],
-        "start": [0, 0],
-        "goal": [1, 2],
-    },
-    "correct": [
-        {
-            "name": "c",
-            "actions": ["right", "down", "right"],
-            "states": [[0, 0], [0, 1], [1, 1], [1, 2]],
-        }
-    ],
-    "incorrect": [
-        {"name": "h", "kind": "hit", "actions": ["up", "down"], "states": [[0, 0], [0, 0], [1, 0]]},
-        {
-            "name": "d",
-            "kind": "detour",
-            "actions": ["down", "right", "right"],
-            "states": [[0, 0], [1, 0], [1, 1], [1, 2]],
-        },
-        {"name": "h2", "kind": "hit", "actions": ["left"], "states": [[0, 0], [0, 0]]},
-    ],
-}
+Write = Callable[[Any], Path]
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Callable[[Any], Path]:
+def write(tmp_path: Path) -> Write:
     """Return a function that writes JSON values, text or bytes into a file."""
 
     def write(content: Any) -> Path:
@@ -66,28 +35,6 @@ def write(tmp_path: Path) -> Callable[[Any], Path]:
         return path
 
     return write
-
-
-def edited(*changes: tuple[tuple[str | int, ...], Any]) -> dict[str, Any]:
-    """Copy the example and set (or, for ..., delete) what stands at some places."""
-    document = copy.deepcopy(EXAMPLE)
-    for place, value in changes:
-        holder: Any = document
-        for key in place[:-1]:
-            holder = holder[key]
-        if value is ...:
-            del holder[place[-1]]
-        elif isinstance(holder, list) and place[-1] == len(holder):
-            holder.append(value)
-        else:
-            holder[place[-1]] = value
-    return document
-
-
-def demo(name: str, kind: str, *actions: str, maze: Maze) -> Demo:
-    """Replay the named actions."""
-    numbers = [ACTIONS.index(action) for action in actions]
-    return Demo(name, kind, maze.replay(numbers), np.array(numbers))
 
 
 def refusal(path: str | os.PathLike[str]) -> str:
@@ -107,11 +54,11 @@ def refusal(path: str | os.PathLike[str]) -> str:
 # --- what a program sees ---------------------------------------------------------------------
 
 
-def test_worked_example(write: Callable[[Any], Path]) -> None:
+def test_worked_example(write: Write) -> None:
     """A small file is read into the states and actions that a person reads in it."""
     demos = load_demos(write(EXAMPLE))
     assert demos.task == "tiny"
-    assert demos.environment == Maze(("S.#", "..G"))
+    assert demos.environment == MAZE
     (correct,) = demos.correct
     assert (correct.name, correct.kind) == ("c", "correct")
     assert correct.actions.tolist() == [2, 1, 2]
@@ -124,26 +71,18 @@ def test_worked_example(write: Callable[[Any], Path]) -> None:
             array[0] = 1
 
 
-def test_what_follows_may_be_left_out(write: Callable[[Any], Path]) -> None:
+def test_what_follows_may_be_left_out(write: Write) -> None:
     """A file without states, start, goal and names of actions says the same."""
-    short = edited(
-        (("description",), ...),
-        (("environment", "actions"), ...),
-        (("environment", "start"), ...),
-        (("environment", "goal"), ...),
-        (("correct", 0, "states"), ...),
-        (("incorrect", 1, "states"), None),
-    )
+    left_out = ("description", *(f"environment.{name}" for name in ("actions", "start", "goal")))
+    short = dict.fromkeys((*left_out, "correct.0.states"), ...) | {"incorrect.1.states": None}
     whole = load_demos(write(EXAMPLE))
-    assert load_demos(write(short)) == Demos(
-        whole.task, whole.environment, whole.correct, whole.incorrect
-    )
-    assert load_demos(write(edited((("incorrect",), ...)))) == whole.select("none")
+    assert load_demos(write(edited(short))) == replace(whole, description="")
+    assert load_demos(write(edited({"incorrect": ...}))) == whole.select("none")
 
 
-def test_how_a_file_is_written_does_not_matter_to_a_learner(write: Callable[[Any], Path]) -> None:
+def test_how_a_file_is_written_does_not_matter_to_a_learner(write: Write) -> None:
     """The hash of what a learner sees is this number, whether or not states are written down."""
-    demos = load_demos(write(edited((("correct", 0, "states"), ...))))
+    demos = load_demos(write(edited({"correct.0.states": ...})))
     assert content_hash(demos) == content_hash(load_demos(write(EXAMPLE)))
     assert content_hash(demos) == "fd501d29923d3fb07e160ae4204c8b9856e874ad52ed4fe92017d68fd6e810aa"
 
@@ -151,18 +90,17 @@ def test_how_a_file_is_written_does_not_matter_to_a_learner(write: Callable[[Any
 # --- warnings --------------------------------------------------------------------------------
 
 
-def test_consistent_demos_give_no_warning(write: Callable[[Any], Path]) -> None:
+def test_consistent_demos_give_no_warning(write: Write) -> None:
     """One demo that asks for one action in each state is silent, and so are equal demos."""
     assert check_demos(write(EXAMPLE)) == []
     twin = EXAMPLE["correct"][0] | {"name": "twin"}
-    assert check_demos(write(edited((("correct", 1), twin)))) == []
+    assert check_demos(write(edited({"correct.1": twin}))) == []
 
 
-def test_two_actions_in_one_state_are_a_warning(write: Callable[[Any], Path]) -> None:
+def test_two_actions_in_one_state_are_a_warning(write: Write) -> None:
     """A demo at odds with itself is read, with a warning that names the state and the actions."""
-    path = write(
-        edited((("correct",), [{"name": "c", "actions": ["up", "right", "down", "right"]}]))
-    )
+    correct = {"name": "c", "actions": ["up", "right", "down", "right"]}
+    path = write(edited({"correct": [correct]}))
     with pytest.warns(DemoWarning, match="d = 0 cannot be reached") as caught:
         demos = load_demos(path)
     assert demos.conflicts() == (0,)
@@ -171,24 +109,23 @@ def test_two_actions_in_one_state_are_a_warning(write: Callable[[Any], Path]) ->
     assert Path(caught[0].filename) == Path(__file__)
 
 
-def test_two_trajectories_are_a_warning(write: Callable[[Any], Path]) -> None:
+def test_two_trajectories_are_a_warning(write: Write) -> None:
     """Different correct demos are read, with a warning that mu_E is an average."""
     other = {"name": "c2", "actions": ["down", "right", "right"]}
-    changes = ((("correct", 1), other), (("incorrect", 1), ...))
-    first, second = check_demos(write(edited(*changes)))
+    first, second = check_demos(write(edited({"correct.1": other, "incorrect.1": ...})))
     assert "'down' and 'right' in [0,0]" in first
     assert "2 different trajectories: mu_E is their average" in second
 
 
-def test_incorrect_demo_without_effect_is_a_warning(write: Callable[[Any], Path]) -> None:
+def test_incorrect_demo_without_effect_is_a_warning(write: Write) -> None:
     """An incorrect demo that marks no pair of its own is named, and only such a one."""
     early = {"name": "early", "kind": "stop", "actions": ["right", "down"]}
-    path = write(edited((("incorrect", 3), early)))
+    path = write(edited({"incorrect.3": early}))
     with pytest.warns(DemoWarning, match="incorrect demo 'early' has no effect") as caught:
         load_demos(path)
     assert [str(warning.message) for warning in caught] == check_demos(path)
     late = early | {"actions": ["right", "down", "down"]}
-    assert check_demos(write(edited((("incorrect", 3), late)))) == []
+    assert check_demos(write(edited({"incorrect.3": late}))) == []
 
 
 # --- writing ---------------------------------------------------------------------------------
@@ -202,7 +139,7 @@ def test_stored_files_are_as_saved(path: Path, tmp_path: Path) -> None:
     assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
 
 
-def test_layout(write: Callable[[Any], Path]) -> None:
+def test_layout(write: Write) -> None:
     """The saved text is JSON of the same value; a demo's actions and states take one line each."""
     path = write(EXAMPLE)
     save_demos(load_demos(path), path)
@@ -248,9 +185,7 @@ def test_round_trip(tmp_path_factory: Any, data: st.DataObject, text: str, long:
     assert path.read_bytes() == saved
 
 
-def test_saving_is_all_or_nothing(
-    write: Callable[[Any], Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_saving_is_all_or_nothing(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     """When a write fails, the old file is whole, nothing is left behind and the error is clear."""
     path = write(EXAMPLE)
     before, demos = path.read_bytes(), load_demos(path)
@@ -285,76 +220,28 @@ def test_saving_refuses_what_cannot_be_read(tmp_path: Path) -> None:
 
 # --- refusals --------------------------------------------------------------------------------
 
-REFUSALS: dict[str, tuple[list[tuple[tuple[str | int, ...], Any]], str]] = {
-    "a structure": ([(("task",), ...)], "the field 'task' is missing; add it"),
-    "an environment": ([(("environment", "goal"), [1, 1])], "environment: 'goal' is [1, 1], but"),
-    "reserved kind": (
-        [(("incorrect", 0, "kind"), "all")],
-        "demo 'h' is incorrect, of kind 'all'; us",
-    ),
-    "no correct demo": (
-        [(("correct",), [])],
-        "there is no correct demo; give at least one from the start to the goal",
-    ),
-    "unknown action": (
-        [(("correct", 0, "actions", 1), "dwon")],
-        "step 2 of demo 'c': unknown action 'dwon'; did you mean 'down'? use up, down, right, left",
-    ),
-    "hits a wall": (
-        [(("incorrect", 0, "states", 1), [0, 1])],
-        "step 1 of demo 'h': 'up' from [0,0] hits a wall and stays, but the file claims [0,1]; "
-        "write [0,0] or change the action",
-    ),
-    "does not follow": (
-        [(("correct", 0, "states", 2), [0, 2])],
-        "step 2 of demo 'c': 'down' from [0,1] leads to [1,1], but the file claims [0,2]; "
-        "write [1,1] or change the action",
-    ),
-    "off the map": (
-        [(("correct", 0, "states", 3), [1, 3])],
-        "leads to [1,2], but the file claims [1,3]",
-    ),
-    "begins elsewhere": (
-        [(("correct", 0, "states", 0), [1, 0])],
-        "demo 'c' starts at [1,0], but the start is [0,0]; write [0,0]",
-    ),
-    "a state too few": (
-        [(("correct", 0, "states", 3), ...)],
-        "demo 'c' has 3 actions and 3 states; give 4 states, the last one reached included, or",
-    ),
-    "a state too many": (
-        [(("correct", 0, "states", 4), [1, 2])],
-        "demo 'c' has 3 actions and 5 states",
-    ),
-    "no states": ([(("correct", 0, "states"), [])], "demo 'c' has 3 actions and 0 states; give 4"),
-    "empty": (
-        [(("incorrect", 2, "actions"), []), (("incorrect", 2, "states"), [[0, 0]])],
-        "demo 'h2' is empty; give it at least one action",
-    ),
-    "goes on": (
-        [(("correct", 0, "actions", 3), "up"), (("correct", 0, "states"), ...)],
-        "demo 'c' goes on after reaching the goal at step 3; drop the steps that follow",
-    ),
-    "incorrect goes on": (
-        [(("incorrect", 1, "actions", 3), "left"), (("incorrect", 1, "states"), ...)],
-        "demo 'd' goes on after reaching the goal at step 3",
-    ),
-    "misses the goal": (
-        [(("correct", 0, "actions", 2), ...), (("correct", 0, "states", 3), ...)],
-        "demo 'c' is correct, but ends at [1,1] and misses the goal [1,2]; add the missing steps",
-    ),
-    "same name": (
-        [(("incorrect", 1, "name"), "c")],
-        "two demos are named 'c'; give each its own name",
-    ),
-}
 
-
-@pytest.mark.parametrize("case", REFUSALS)
-def test_refusals(case: str, write: Callable[[Any], Path]) -> None:
-    """Each way to spoil a file is refused in one line that names the place and the fix."""
-    changes, message = REFUSALS[case]
-    assert message in refusal(write(edited(*changes)))
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"task": ...}, "the field 'task' is missing; add it"),
+        ({"environment.goal": [1, 1]}, "environment: 'goal' is [1, 1], but"),
+        ({"correct.0.actions.1": "dwon"}, "step 2 of demo 'c': unknown action 'dwon' (did you me"),
+        ({"correct.0.states.2": [0, 2]}, "'down' from [0,1] leads to [1,1], but the file claims"),
+        ({"correct.0.states.0": [1, 0]}, "demo 'c' starts at [1,0], but the start is [0,0]; wri"),
+        ({"incorrect.0.states.1": [0, 1]}, "'up' from [0,0] hits a wall and stays, but the file"),
+        ({"correct.0.states": []}, "demo 'c' has 3 actions and 0 states; give 4"),
+        ({"incorrect.2.actions": [], "incorrect.2.states": [[0, 0]]}, "demo 'h2' is empty; give"),
+        ({"incorrect.1.actions.3": "up", "incorrect.1.states": ...}, "demo 'd' goes on after"),
+        ({"correct": []}, "there is no correct demo; give at least one from the start to the goal"),
+        ({"incorrect.1.name": "c"}, "two demos are named 'c'; give each its own name"),
+        ({"incorrect.0.kind": "all"}, "demo 'h' is incorrect, of kind 'all'; use small"),
+        ({"correct.0.actions.2": ..., "correct.0.states.3": ...}, "misses the goal [1,2]; add the"),
+    ],
+)
+def test_refusals(changes: Changes, message: str, write: Write) -> None:
+    """Whatever finds the fault - structure, moves, model - one line names the place and the fix."""
+    assert message in refusal(write(edited(changes)))
 
 
 def test_refusals_of_paths(tmp_path: Path) -> None:

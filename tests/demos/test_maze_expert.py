@@ -6,34 +6,20 @@ from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from replication import Demos, Maze, MazeError, demonstrate, load_demos
+from replication import Demos, Maze, demonstrate
 from replication.demos.maze_expert import OPPOSITE, Expert, _way, correct_actions, random_actions
 from replication.envs.maze import as_maze
-from replication.files import PROJECT
 from replication.paper.published import MOVES
+from tests.envs.mazes import mazes
 
 STEPS = ((-1, 0), (1, 0), (0, 1), (0, -1))  # up, down, right, left
 DETOURS = ("detour", "near-detour", "far-detour")
 LEGS = [1, 2, 4, 8, 16]
-
-
-@st.composite
-def mazes(draw: st.DrawFn, most: int = 7) -> Maze:
-    """Any small maze, of any shape."""
-    n_columns, n_rows = draw(st.integers(2, most)), draw(st.integers(2, most))
-    size = n_rows * n_columns
-    cells = draw(st.lists(st.sampled_from("....#"), min_size=size, max_size=size))
-    start, goal = draw(st.permutations(range(size)))[:2]
-    cells[start], cells[goal] = "S", "G"
-    try:
-        return Maze(tuple("".join(cells[i : i + n_columns]) for i in range(0, size, n_columns)))
-    except MazeError as error:
-        assume("cannot be reached" not in str(error))
-        raise
+START, GOAL = (17, 2), (2, 18)  # of both stored mazes
 
 
 def shortest(rows: tuple[str, ...]) -> int:
@@ -90,31 +76,19 @@ def cost(actions: list[int], leg: int) -> int:
     return sum((len(list(moves)) - leg) ** 2 for _, moves in groupby(actions))
 
 
-@pytest.mark.parametrize("name", ["open_maze", "obstacle_maze"])
-def test_stored_files_follow_from_the_rules(name: str) -> None:
+def test_stored_files_follow_from_the_rules(stored_demos: Demos) -> None:
     """A stored file is what the expert makes of its map with the registered parameters."""
-    stored = load_demos(PROJECT / "data" / "demos" / f"{name}.json")
-    made = demonstrate(stored.task, as_maze(stored.environment), description=stored.description)
-    assert made == stored
+    maze, text = as_maze(stored_demos.environment), stored_demos.description
+    assert demonstrate(stored_demos.task, maze, description=text) == stored_demos
 
 
-def test_stored_correct_demonstrations_are_the_papers_shortest_paths(stored_demos: Demos) -> None:
-    """31 and 33 moves, as the paper says, and no way in the map is shorter."""
-    (correct,) = stored_demos.correct
-    assert len(correct.actions) == MOVES[stored_demos.task]
-    assert len(correct.actions) == shortest(as_maze(stored_demos.environment).rows)
-
-
-def test_stored_mazes_share_start_and_goal() -> None:
-    """Both mazes have 20 x 20 cells, the same start and the same goal; one has no obstacles."""
-    one, other = (
-        as_maze(load_demos(PROJECT / "data" / "demos" / f"{name}.json").environment)
-        for name in ("open_maze", "obstacle_maze")
-    )
-    assert one.shape == other.shape == (20, 20)
-    assert (one.start, one.goal) == (other.start, other.goal)
-    assert one.free.all()
-    assert not other.free.all()
+def test_stored_mazes_are_the_papers(stored_demos: Demos) -> None:
+    """20 x 20 cells, start and goal in both; 31 and 33 moves, and no way in the map is shorter."""
+    maze, (correct,) = as_maze(stored_demos.environment), stored_demos.correct
+    assert maze.shape == (20, 20)
+    assert (maze.cell(maze.start), maze.cell(maze.goal)) == (START, GOAL)
+    assert maze.free.all() == (stored_demos.task == "open-maze")
+    assert len(correct.actions) == MOVES[stored_demos.task] == shortest(maze.rows)
 
 
 @given(maze=mazes(5), leg=st.sampled_from(LEGS))

@@ -7,15 +7,8 @@ import pytest
 
 from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos, content_hash, state_action_pairs
-from replication.envs.maze import ACTIONS, Maze
-
-MAZE = Maze(("S.#", "..G"))
-
-
-def demo(name: str, kind: str, *actions: str, maze: Maze = MAZE) -> Demo:
-    """Replay the named actions."""
-    numbers = [ACTIONS.index(action) for action in actions]
-    return Demo(name, kind, maze.replay(numbers), np.array(numbers))
+from replication.envs.maze import Maze
+from tests.demos.example import MAZE, demo
 
 
 @pytest.fixture
@@ -50,21 +43,21 @@ def test_demos_validate_themselves() -> None:
     maze = Maze(("S.G",))
     right = demo("a", "correct", "right", "right", maze=maze)
     bad = demo("b", "hit", "up", maze=maze)
+    stray = Demo("a", "correct", np.array([0, 1]), np.array([4]))
+    jump = Demo("a", "correct", np.array([0, 2]), np.array([2]))
     Demos("t", maze, (right,), (bad,))
-    with pytest.raises(DemoError, match="two demos are named 'a'"):
-        Demos("t", maze, (right, right))
-    with pytest.raises(DemoError, match="'b' is correct; its kind must be 'correct'"):
-        Demos("t", maze, (bad,))
-    with pytest.raises(DemoError, match="'b' is incorrect, of kind 'correct'"):
-        Demos("t", maze, (right,), (demo("b", "correct", "up", maze=maze),))
-    with pytest.raises(DemoError, match="no correct demo"):
-        Demos("t", maze, ())
-    with pytest.raises(DemoError, match="letters, digits"):
-        Demos("../t", maze, (right,))
-    with pytest.raises(DemoError, match=r"actions must be 0\.\.3"):
-        Demos("t", maze, (Demo("a", "correct", np.array([0, 1]), np.array([4])),))
-    with pytest.raises(DemoError, match=r"step 1 .* leads to \[0,1\], but the file claims \[0,2\]"):
-        Demos("t", maze, (Demo("a", "correct", np.array([0, 2]), np.array([2])),))
+    for task, correct, incorrect, message in (
+        ("t", (right, right), (), "two demos are named 'a'"),
+        ("t", (bad,), (), "'b' is correct; its kind must be 'correct'"),
+        ("t", (demo("a", "correct", "right", maze=maze),), (), r"misses the goal \[0,2\]"),
+        ("t", (right,), (replace(bad, kind="correct"),), "'b' is incorrect, of kind 'correct'"),
+        ("t", (), (), "no correct demo"),
+        ("../t", (right,), (), "letters, digits"),
+        ("t", (stray,), (), r"actions must be 0\.\.3"),
+        ("t", (jump,), (), r"step 1 .* leads to \[0,1\], but the file claims \[0,2\]"),
+    ):
+        with pytest.raises(DemoError, match=message):
+            Demos(task, maze, correct, incorrect)
     with pytest.raises(DemoError, match="one-dimensional array of integers"):
         Demo("a", "correct", np.array([0.0, 1.0]), np.array([2]))
 

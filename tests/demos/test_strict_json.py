@@ -33,20 +33,14 @@ VALUES = st.recursive(
     [
         (b"", "is empty"),
         (b" \n", "is empty"),
-        (
-            b"{",
-            "is not JSON: Expecting property name enclosed in double quotes at line 1, column 2",
-        ),
-        (
-            b"{\n \"format\": 'x'}",
-            "is not JSON: Expecting value at line 2, column 12; fix it there",
-        ),
+        (b"{", "is not JSON: Expecting property name enclosed in dou"),
+        (b"{\n \"format\": 'x'}", "is not JSON: Expecting value at line 2, column 12; fix it"),
         (b"{} {}", "is not JSON: Extra data at line 1, column 4"),
         ("{}".encode("utf-16"), "is not UTF-8 text (byte 1); save it as UTF-8"),
         (b'{"a": "\xff"}', "is not UTF-8 text (byte 8)"),
         (b'{"a": 1, "b": {"c": 1, "c": 2}}', "the field 'c' appears twice in one object; keep one"),
-        (b'{"a": NaN}', "NaN is not a JSON number; write a finite number"),
-        (b"[-Infinity]", "-Infinity is not a JSON number"),
+        (b'{"a": NaN}', "the number NaN is too large or not finite; write a small number"),
+        (b"[-Infinity]", "the number -Infinity is"),
         (b'{"a": 1e999}', "the number 1e999 is too large"),
         (b'{"a": ' + b"9" * 10_000 + b"}", "the number 9999999999"),
         (b"[" * 100_000, "is nested too deeply"),
@@ -139,14 +133,15 @@ def test_refusals_of_paths(tmp_path: Path) -> None:
     assert read_content(tmp_path / "file") == b"\r\n\xff"
 
 
-def test_large_files_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The size is looked at before the file is opened."""
+def test_large_files_are_not_read_whole(tmp_path: Path) -> None:
+    """Of a large file no more is read than shows that it is too large."""
     path = tmp_path / "large.json"
     with path.open("wb") as file:
-        file.truncate(MAX_BYTES + 1)
-    monkeypatch.setattr(Path, "open", None)
+        file.truncate(100 * MAX_BYTES)
+    content = read_content(path)
+    assert len(content) == MAX_BYTES + 1
     with pytest.raises(DemoError, match="is larger than 10 MB; drop some demos"):
-        read_content(path)
+        read_json(content)
 
 
 def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

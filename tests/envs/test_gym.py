@@ -10,23 +10,12 @@ from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from replication.demos.soccer_expert import demonstrate_soccer
+from replication import Demos
 from replication.envs.gym import MazeEnv
 from replication.envs.maze import ACTIONS, Maze, MazeError
 from replication.envs.soccer import rules
 from replication.envs.soccer.compiled import FastSoccerWorld
-
-ROWS = ("...#G", ".#...", "S..#.")  # not square
-CORRIDOR = ("S...G",)
-
-
-@st.composite
-def mazes(draw: st.DrawFn) -> Maze:
-    """Any small maze without obstacles, of any shape."""
-    n_rows, n_columns = draw(st.tuples(st.integers(1, 5), st.integers(2, 5)))
-    cells = ["S", "G", *"." * (n_rows * n_columns - 2)]
-    shuffled = "".join(draw(st.permutations(cells)))
-    return Maze(tuple(shuffled[at : at + n_columns] for at in range(0, len(cells), n_columns)))
+from tests.envs.mazes import CORRIDOR, ROWS, mazes
 
 
 def test_maze_passes_gymnasiums_check() -> None:
@@ -37,7 +26,7 @@ def test_maze_passes_gymnasiums_check() -> None:
 
 
 @settings(max_examples=50, deadline=None)
-@given(mazes() | st.just(Maze(ROWS)), st.lists(st.integers(0, 3), max_size=60))
+@given(mazes(5), st.lists(st.integers(0, 3), max_size=60))
 def test_maze_follows_the_table(maze: Maze, actions: list[int]) -> None:
     """An episode visits the states of the table, earns w[s, a] and terminates at the goal only."""
     weights = np.arange(maze.n_states * 4.0).reshape(-1, 4)
@@ -107,11 +96,11 @@ def test_maze_is_drawn() -> None:
     assert set(columns // 8) == {0}
 
 
-def test_soccer_does_what_its_world_does() -> None:
+def test_soccer_does_what_its_world_does(soccer_demos: Demos) -> None:
     """The environment passes Gymnasium's checks and reports what its world does."""
     env = gymnasium.make("replication/Soccer-v0", render_mode="rgb_array")
     check_env(env.unwrapped)
-    (correct,) = demonstrate_soccer("s").correct
+    (correct,) = soccer_demos.correct
     world, last = FastSoccerWorld(), len(correct.actions) - 1
     state, _ = env.reset(seed=0)
     for i, action in enumerate(correct.actions.tolist()):

@@ -1,33 +1,15 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from replication import Demos
-from replication.demos.soccer_expert import demonstrate_soccer
 from replication.envs.soccer import rules
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.replay import replay
-from replication.envs.soccer.rules import FORWARD, LEFT, SLOW
+from replication.envs.soccer.rules import FORWARD, LEFT
 from replication.envs.soccer.world import SoccerWorld
 
 FIELD = SoccerField()
-
-
-@pytest.fixture(scope="module")
-def demos() -> Demos:
-    """Let the expert demonstrate."""
-    return demonstrate_soccer("soccer", FIELD)
-
-
-def test_correct_demo_scores_and_slows_down(demos: Demos) -> None:
-    """The expert drives slowly exactly while it detects an obstacle, and ends with a goal."""
-    episode = replay(FIELD, demos.correct[0].actions)
-    assert episode.outcome == "goal"
-    assert episode.balls[-1, 0] >= rules.GOAL_X
-    np.testing.assert_array_equal(episode.detected[:-1], episode.actions == SLOW)
-    assert 0 < episode.detected.sum() < len(episode.actions)
-    assert not episode.touched.any()
 
 
 def test_detected_obstacle_is_the_one_in_front() -> None:
@@ -38,9 +20,9 @@ def test_detected_obstacle_is_the_one_in_front() -> None:
     assert episode.seen[-1].tolist() == (distance[-1] == distance[-1].min()).tolist()
 
 
-def test_replay_equals_the_plain_world(demos: Demos) -> None:
+def test_replay_equals_the_plain_world(soccer_demos: Demos) -> None:
     """A replay holds what the world shows at each border between two decisions, bit by bit."""
-    world, actions = SoccerWorld(), demos.incorrect[0].actions.tolist()
+    world, actions = SoccerWorld(), soccer_demos.incorrect[0].actions.tolist()
     world.reset()
     episode = replay(FIELD, actions)
     for t, action in enumerate([*actions, None]):
@@ -55,10 +37,14 @@ def test_replay_equals_the_plain_world(demos: Demos) -> None:
     assert episode.touched.tolist() == [False] * (len(actions) - 1) + [True]
 
 
-def test_replay_stops_when_the_episode_is_over(demos: Demos) -> None:
+def test_replay_stops_when_the_episode_is_over(soccer_demos: Demos) -> None:
     """Actions after a goal, or after the time is up, are left out."""
-    right = demos.correct[0].actions.tolist()
-    assert replay(FIELD, [*right, LEFT, LEFT]).actions.tolist() == right
+    right = soccer_demos.correct[0].actions.tolist()
+    scored = replay(FIELD, [*right, LEFT, LEFT])
+    assert scored.actions.tolist() == right
+    assert scored.outcome == "goal"
+    assert scored.balls[-1, 0] >= rules.GOAL_X
+    assert not scored.touched.any()
     short = SoccerField(rules.SoccerParams(time_limit=60.0))
     late = replay(short, [LEFT] * 300)
     assert late.outcome == "time out"

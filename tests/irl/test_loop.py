@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +12,12 @@ from replication import Demos
 from replication.irl import Trial, get_method, iterate, run
 from replication.irl.agent import Episode
 from replication.irl.expectations import feature_expectations
+from replication.irl.loop import Answer, Request
 from replication.paper.params import Params
 from replication.trials.condition import Condition
 
 Array = NDArray[np.float64]
+Loop = Generator[Request, Answer, Trial]
 GAMMA = 0.9
 NEXT = np.array([[1, 0], [2, 0], [3, 1], [4, 2], [4, 4]])  # a corridor of five: right, left
 EXPERT = np.array([0, 1, 2, 3, 4]), np.array([0, 0, 0, 0])
@@ -53,19 +57,23 @@ def _mu_e() -> Array:
     return feature_expectations(*EXPERT, gamma=GAMMA, shape=(5, 2))
 
 
-def _trial(method: str = "unified", *, keep: bool = False, **choices: object) -> Trial:
+def _loop(
+    agent: Corridor,
+    method: str = "unified",
+    *,
+    mu_e: Array | None = None,
+    keep: bool = False,
+    **choices: Any,
+) -> Loop:
+    mu_e = _mu_e() if mu_e is None else mu_e
+    mu_b, seed = np.zeros((5, 2), dtype=bool), np.random.SeedSequence(1)
+    params = Params.of(**choices)
+    return iterate(agent, get_method(method), mu_e, mu_b, params, seed=seed, keep=keep)
+
+
+def _trial(method: str = "unified", *, keep: bool = False, **choices: Any) -> Trial:
     agent = Corridor()
-    mu_b = np.zeros((5, 2), dtype=bool)
-    loop = iterate(
-        agent,
-        get_method(method),
-        _mu_e(),
-        mu_b,
-        Params.of(**choices),
-        seed=np.random.SeedSequence(1),
-        keep=keep,
-    )
-    ((position, trial),) = run(agent, [loop])
+    ((position, trial),) = run(agent, [_loop(agent, method, keep=keep, **choices)])
     assert position == 0
     return trial
 
@@ -166,15 +174,7 @@ def test_weights_are_the_sum_of_the_updates() -> None:
 @pytest.mark.parametrize(("q_start", "from_zero"), [("reset", True), ("kept", False)])
 def test_q_is_reset_or_kept(q_start: str, from_zero: bool) -> None:
     """Q-START decides what the second learning call starts from."""
-    agent = Corridor()
-    loop = iterate(
-        agent,
-        get_method("unified"),
-        _mu_e(),
-        np.zeros((5, 2), dtype=bool),
-        Params.of(q_start=q_start, max_iterations=2, threshold=1e-9),
-        seed=np.random.SeedSequence(1),
-    )
+    loop = _loop(Corridor(), q_start=q_start, max_iterations=2, threshold=1e-9)
     answer, requests = None, []
     for _ in range(2):
         request = loop.send(answer)  # type: ignore[arg-type]
@@ -205,18 +205,7 @@ def test_random_start_weights_come_from_the_seed() -> None:
 def test_trials_side_by_side_learn_in_one_call() -> None:
     """Each iteration of several trials is one call of the agent, and each trial comes out alone."""
     agent = Corridor()
-    loops = [
-        iterate(
-            agent,
-            get_method(name),
-            _mu_e(),
-            np.zeros((5, 2), dtype=bool),
-            Params(),
-            seed=np.random.SeedSequence(1),
-        )
-        for name in ("unified", "adaboost")
-    ]
-    together = dict(run(agent, loops))
+    together = dict(run(agent, [_loop(agent, name) for name in ("unified", "adaboost")]))
     assert sorted(together) == [0, 1]
     assert agent.calls == max(trial.iterations for trial in together.values())
     for position, name in enumerate(("unified", "adaboost")):
@@ -228,13 +217,5 @@ def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     agent = Corridor()
     episode, _ = agent.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
     mu = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
-    loop = iterate(
-        agent,
-        get_method("unified"),
-        mu,
-        np.zeros((5, 2), dtype=bool),
-        Params(),
-        seed=np.random.SeedSequence(1),
-    )
-    ((_, trial),) = run(agent, [loop])
+    ((_, trial),) = run(agent, [_loop(agent, mu_e=mu)])
     assert (trial.iterations, trial.converged, agent.calls) == (0, True, 0)

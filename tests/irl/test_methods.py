@@ -1,10 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from replication import METHODS
+from replication import METHODS, Demos, fit
+from replication.evidence.experiments import method_conditions
+from replication.evidence.tables import contrasts_table, summary_table
 from replication.irl import get_method
 from replication.paper.register import ChoiceError
+from replication.report import curves
+from replication.trials.measures import measure_trials
+from replication.trials.run import run_trials
+from replication.trials.store import Store
 
 
 def test_names_are_keys_and_labels_are_distinct() -> None:
@@ -22,3 +32,37 @@ def test_misspelt_method_is_refused_with_the_list() -> None:
     """An unknown name raises, suggests the nearest and lists the rest."""
     with pytest.raises(ChoiceError, match=r"did you mean 'unified'.*adaboost"):
         get_method("unifed")
+
+
+def test_a_new_method_is_one_row(
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A perceptron, which moves each weight by its residual, is in every table and picture."""
+    perceptron = replace(
+        METHODS["adaboost"],
+        name="perceptron",
+        label="Perceptron",
+        colour="#009E73",
+        baseline="adaboost",
+        start=lambda shape, params: np.ones(shape),
+        update=lambda w, f, mu_e, mu_i, mu_b, params: (w + f * (mu_e - mu_i), f),
+    )
+    monkeypatch.setitem(METHODS, perceptron.name, perceptron)
+    assert fit(small_demos, method="perceptron", seed=1).errors[-1] == 0
+
+    conditions = method_conditions(small_demos, {"episodes": 60, "horizon": 40}, METHODS)
+    every = list(conditions.values())
+    results = run_trials(every, trials=3, store=Store(store_path), seed=1)
+    trials = measure_trials(results, every)
+    assert (trials["method"] == "perceptron").sum() == 3
+    summary = summary_table(trials, {}).set_index("method")
+    assert summary.loc["perceptron", "n"] == 3
+    (compared,) = contrasts_table(trials).query("x == 'perceptron'").itertuples()
+    assert (compared.y, compared.n) == ("adaboost", 3)
+    for picture in (
+        curves.errors(results, conditions, {}),
+        curves.iterations(results, conditions, {}),
+    ):
+        assert "Perceptron: " in picture.words
+        (legend,) = picture.draw(picture.numbers).legends
+        assert "Perceptron" in [entry.get_text() for entry in legend.get_texts()]

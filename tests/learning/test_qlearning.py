@@ -32,6 +32,14 @@ def make_streams(seed: int, trials: int) -> Array:
     return np.array([stream(s) for s in seeds], np.uint64).reshape(trials, 4)
 
 
+def learn_plain(next_state: Any, weights: Array, q: Array, **options: Any) -> tuple[Array, Array]:
+    """Return Q and the numbers of steps; the options are added to a single greedy episode."""
+    task = {"start": 0, "episodes": 1, "horizon": 9, "beta": 1.0, "gamma": 0.5, "epsilon": 0.0}
+    streams = make_streams(1, len(q))
+    values, _, steps = qlearning.learn(np.array(next_state), weights, q, streams, **task | options)
+    return values, steps
+
+
 def same_bits(a: Array, b: Array) -> bool:
     """Compare floats by their bits, so that zeros of both signs differ."""
     return a.tobytes() == b.tobytes()
@@ -123,15 +131,8 @@ def test_learn_equals_the_reference_in_any_small_task(
     assert_like_reference(*arrays, **options)
 
 
-LEARN: dict[str, Any] = {
-    "start": 20,
-    "goal": 4,
-    "episodes": 20,
-    "horizon": 50,
-    "beta": 0.7,
-    "gamma": 0.9,
-    "epsilon": 0.1,
-}
+RATES = {"beta": 0.7, "gamma": 0.9, "epsilon": 0.1}
+LEARN: dict[str, Any] = {"start": 20, "goal": 4, "episodes": 20, "horizon": 50, **RATES}
 
 
 @pytest.fixture
@@ -180,24 +181,12 @@ def test_inputs_are_not_modified(batch: tuple[Array, Array, Array]) -> None:
 @pytest.mark.parametrize("trials", [1, 12])
 def test_worked_example(trials: int) -> None:
     """By hand: two greedy episodes along a corridor carry the last reward one state back."""
-    next_state = np.array([[0, 1], [1, 2], [2, 3], [3, 3]])
+    next_state = [[0, 1], [1, 2], [2, 3], [3, 3]]
     weights = np.zeros((trials, 4, 2))
     weights[:, 2, 1] = 8.0  # for the step into the goal
     q = np.zeros_like(weights)
     q[:, :, 1] = 1.0  # so that moving on is greedy
-    values, _, steps = qlearning.learn(
-        next_state,
-        weights,
-        q,
-        make_streams(0, trials),
-        start=0,
-        goal=3,
-        episodes=2,
-        horizon=9,
-        beta=1.0,
-        gamma=0.5,
-        epsilon=0.0,
-    )
+    values, steps = learn_plain(next_state, weights, q, goal=3, episodes=2)
     # Episode 1: Q(0) = 1/2, Q(1) = 1/2, Q(2) = 8. Episode 2: Q(0) = 1/4, Q(1) = 4, Q(2) = 8.
     assert values[:, :, 1].tolist() == [[0.25, 4.0, 8.0, 1.0]] * trials
     assert (values[:, :, 0] == 0).all()
@@ -205,47 +194,21 @@ def test_worked_example(trials: int) -> None:
 
 
 @pytest.mark.parametrize("trials", [1, 12])
-@pytest.mark.parametrize(
-    ("goal", "expected"),
-    [(0, 6.0), (1, 1.0)],
-    ids=["time-out", "goal"],
-)
+@pytest.mark.parametrize(("goal", "expected"), [(0, 6.0), (1, 1.0)], ids=["time-out", "goal"])
 def test_only_the_goal_is_terminal(goal: int, expected: float, trials: int) -> None:
     """A time-out bootstraps from the state it ends in; the goal is worth 0 whatever its Q."""
     q = np.zeros((trials, 2, 1))
     q[:, 1] = 10.0
-    values, _, _ = qlearning.learn(
-        np.array([[1], [1]]),
-        np.ones((trials, 2, 1)),
-        q,
-        make_streams(0, trials),
-        start=0,
-        goal=goal,
-        episodes=1,
-        horizon=1,
-        beta=1.0,
-        gamma=0.5,
-        epsilon=0.0,
-    )
+    values, _ = learn_plain([[1], [1]], np.ones((trials, 2, 1)), q, goal=goal, horizon=1)
     assert values[:, :, 0].tolist() == [[expected, 10.0]] * trials
 
 
 @pytest.mark.parametrize(("goal", "length"), [(3, 3), (0, 7)], ids=["goal", "time-out"])
 def test_steps_are_counted(goal: int, length: int) -> None:
     """In a one-way corridor an episode has as many steps as the way, or as the horizon."""
-    _, _, steps = qlearning.learn(
-        np.array([[1], [2], [3], [3]]),
-        np.zeros((9, 4, 1)),
-        np.zeros((9, 4, 1)),
-        make_streams(0, 9),
-        start=0,
-        goal=goal,
-        episodes=5,
-        horizon=7,
-        beta=0.5,
-        gamma=0.9,
-        epsilon=0.5,
-    )
+    zeros = np.zeros((9, 4, 1))
+    options = {"goal": goal, "episodes": 5, "horizon": 7, "epsilon": 0.5}
+    _, steps = learn_plain([[1], [2], [3], [3]], zeros, zeros, **options)
     assert steps.tolist() == [5 * length] * 9
 
 
@@ -256,19 +219,8 @@ def test_exploration_is_uniform_with_probability_epsilon(trials: int, epsilon: f
     episodes, beta = 4000, 2.0**-10
     q = np.zeros((trials, 2, 4))
     q[:, 0, 2] = 2.0
-    values, _, _ = qlearning.learn(
-        np.ones((2, 4), np.int64),
-        np.ones((trials, 2, 4)),
-        q,
-        make_streams(1, trials),
-        start=0,
-        goal=1,
-        episodes=episodes,
-        horizon=1,
-        beta=beta,
-        gamma=0.0,
-        epsilon=epsilon,
-    )
+    options = {"goal": 1, "episodes": episodes, "horizon": 1, "beta": beta, "epsilon": epsilon}
+    values, _ = learn_plain(np.ones((2, 4), np.int64), np.ones((trials, 2, 4)), q, **options)
     # An update shrinks Q - 1 by 1 - beta, so Q counts its updates, and action 2 stays the best.
     counts = np.log(np.abs(values[:, 0] - 1)) / np.log1p(-beta)
     assert np.allclose(counts, counts.round(), atol=1e-6)
@@ -374,14 +326,9 @@ def test_what_does_not_fit_is_refused(
         qlearning.learn(**(arrays | LEARN | change))
 
 
-@pytest.mark.parametrize(
-    ("q", "stream", "message"),
-    [
-        (np.zeros((1, 25, 4)), np.ones(4, np.uint64), "q must have the shape"),
-        (np.zeros((25, 4)), np.ones((1, 4), np.uint64), "stream must be uint64"),
-    ],
-)
-def test_roll_out_refuses_what_does_not_fit(q: Array, stream: Array, message: str) -> None:
+def test_roll_out_refuses_what_does_not_fit() -> None:
     """A roll-out wants one trial's Q and stream."""
-    with pytest.raises(ValueError, match=message):
-        qlearning.roll_out(grid(5, 5), q, stream, start=20, goal=4, horizon=5)
+    q, words = np.zeros((25, 4)), np.ones(4, np.uint64)
+    for values, state, message in ((q[None], words, "q must"), (q, words[None], "stream must")):
+        with pytest.raises(ValueError, match=message):
+            qlearning.roll_out(grid(5, 5), values, state, start=20, goal=4, horizon=5)

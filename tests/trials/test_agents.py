@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from replication import Demos, Params, load_demos
+from replication import Demos, Params
 from replication.envs.maze import MazeError, as_maze
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import SoccerParams
 from replication.envs.soccer.world import SoccerWorld
 from replication.errors import UserError
-from replication.files import PROJECT
 from replication.learning.seeds import stream
 from replication.paper.published import SOCCER
 from replication.paper.register import ChoiceError
@@ -23,25 +22,21 @@ from replication.trials.maze_agent import MazeAgent
 from replication.trials.soccer_agent import SoccerAgent
 
 
-@pytest.fixture(scope="module")
-def soccer() -> Demos:
-    """Load the stored soccer demonstrations."""
-    return load_demos(PROJECT / "data" / "demos" / "soccer.json")
-
-
-def test_each_environment_has_its_agent(small_demos: Demos, soccer: Demos) -> None:
+def test_each_environment_has_its_agent(small_demos: Demos, soccer_demos: Demos) -> None:
     """A maze makes a maze agent, a field a soccer agent, another kind an error that lists both."""
     assert isinstance(make_agent(small_demos.environment, Params()), MazeAgent)
-    assert isinstance(make_agent(soccer.environment, Params.of(**SOCCER)), SoccerAgent)
+    assert isinstance(make_agent(soccer_demos.environment, Params.of(**SOCCER)), SoccerAgent)
     chess: Any = SimpleNamespace(kind="chess")
     with pytest.raises(ChoiceError, match="unknown kind of environment 'chess'; known: maze, socc"):
         make_agent(chess, Params())
 
 
-def test_agents_refuse_the_other_kind_of_environment(small_demos: Demos, soccer: Demos) -> None:
+def test_agents_refuse_the_other_kind_of_environment(
+    small_demos: Demos, soccer_demos: Demos
+) -> None:
     """The maze's agent needs a maze and the soccer agent a field: else one line says so."""
     with pytest.raises(MazeError, match=r"a maze is needed here, .* of kind 'soccer'"):
-        maze_agent.make_agent(soccer.environment, Params())
+        maze_agent.make_agent(soccer_demos.environment, Params())
     with pytest.raises(UserError, match=r"robot soccer is needed here, .* of kind 'maze'"):
         soccer_agent.make_agent(small_demos.environment, Params())
 
@@ -73,10 +68,10 @@ def test_hits_in_mazes_are_the_moves_that_change_nothing(stored_demos: Demos) ->
 
 
 @pytest.mark.parametrize("macro", ["decision", "cell"])
-def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: str) -> None:
+def test_hits_in_soccer_are_the_decisions_with_contacts(soccer_demos: Demos, macro: str) -> None:
     """Where the plain world, given an episode's actions, counts more contacts, there is a hit."""
-    assert isinstance(soccer.environment, SoccerField)
-    field = replace(soccer.environment, params=SoccerParams(macro=macro, time_limit=60.0))
+    assert isinstance(soccer_demos.environment, SoccerField)
+    field = replace(soccer_demos.environment, params=SoccerParams(macro=macro, time_limit=60.0))
     agent = make_agent(field, Params.of(**SOCCER))
     world = SoccerWorld(field.params)
     seen: set[bool] = set()
@@ -94,10 +89,10 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer: Demos, macro: st
     assert seen == {True, False}
 
 
-def test_soccer_trials_do_not_depend_on_each_other(soccer: Demos) -> None:
+def test_soccer_trials_do_not_depend_on_each_other(soccer_demos: Demos) -> None:
     """Two trials learned in one call have the bits of each learned alone."""
     params = Params.of(**{**SOCCER, "episodes": 3})
-    agent = make_agent(soccer.environment, params)
+    agent = make_agent(soccer_demos.environment, params)
     rng = np.random.default_rng(1)
     weights, q = rng.normal(size=(2, *agent.shape)), np.zeros((2, *agent.shape))
     streams = np.stack([stream(np.random.SeedSequence(k)) for k in range(2)])
@@ -108,12 +103,12 @@ def test_soccer_trials_do_not_depend_on_each_other(soccer: Demos) -> None:
             np.testing.assert_array_equal(one[0], other[k])
 
 
-def test_soccer_goal_value_matters(soccer: Demos) -> None:
+def test_soccer_goal_value_matters(soccer_demos: Demos) -> None:
     """GOAL-VALUE bootstrap changes what is learned where a goal falls, and nothing before."""
     tables = []
     for goal_value in ("zero", "bootstrap"):
-        condition = Condition(soccer, "unified", Params.of(**SOCCER, goal_value=goal_value))
-        (correct,) = soccer.correct
+        condition = Condition(soccer_demos, "unified", Params.of(**SOCCER, goal_value=goal_value))
+        (correct,) = soccer_demos.correct
         weights = np.zeros((1, *condition.agent.shape))
         weights[0, correct.states[:-1], correct.actions] = 1.0
         words = stream(np.random.SeedSequence(2))[None]

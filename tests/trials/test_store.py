@@ -222,14 +222,8 @@ def test_a_damaged_trial_is_never_taken_for_a_good_one(store_path: Path) -> None
         *(
             b'{"errors": ["%s", [%s]]}\n' % (kind, length)
             for kind, length in [
-                (b"<f8", b"9"),
-                (b"<f8", b"-1"),
-                (b"<f8", b"1" * 99),
-                (b"<f8", b'"a"'),
-                (b"|O", b"1"),
-                (b"x", b"1"),
-                (b"<f8", b"1e9"),
-                (b"<f8", b"null"),
+                *((b"<f8", length) for length in (b"9", b"-1", b"1" * 99, b'"a"', b"1e9", b"null")),
+                *((b"|O", b"1"), (b"x", b"1")),
             ]
         ),
         b'{"lengths": ["<i8", [0]]}\n',
@@ -347,14 +341,14 @@ def test_a_killed_process_leaves_whole_batches(store_path: Path) -> None:
 
 def test_two_processes_write_at_once(store_path: Path) -> None:
     """Two processes that fill one store with the same keys both succeed and mix nothing up."""
-    program = "for b in range(20): store.put(batch(b, {}))"
+    program = "for b in range(8): store.put(batch(b, {}))"
     processes = [child(program.format(value), store_path) for value in (1, 2)]
     for process in processes:
         with process:
             pass
         assert process.returncode == 0
-    assert stored_batches(store_path, 20) == [50] * 20
+    assert stored_batches(store_path, 8) == [50] * 8
     store = Store(store_path)
-    for b in range(20):
+    for b in range(8):
         steps = {store.get(f"{b}/{k}").steps for k in range(50)}
         assert steps in ({1}, {2})

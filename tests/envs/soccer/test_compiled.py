@@ -15,8 +15,8 @@ from replication.envs.soccer import compiled, rules
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.rules import SoccerParams
 from replication.envs.soccer.world import Contacts, SoccerWorld
+from tests.envs.soccer.placing import OVERLAP, place
 
-OVERLAP = 0.011  # contacts are noticed after bodies have moved on for a tick, at most 0.01 m
 # On some processors a compiler may fuse a product and a sum, which rounds once instead of twice.
 EXACT = platform.machine() in ("x86_64", "AMD64")
 VARIANTS: tuple[dict[str, Any], ...] = (
@@ -43,13 +43,6 @@ def agree(one: SoccerWorld, other: SoccerWorld) -> bool:
         atol=1e-9,
     )
     return close and explicit(one)[3:] == explicit(other)[3:]
-
-
-def place(world: SoccerWorld, pose: Any = None, ball: Any = None, velocity: Any = None) -> None:
-    """Put the robot and the ball somewhere."""
-    world.pose = pose or world.pose
-    world.ball = ball or world.ball
-    world.ball_velocity = velocity or world.ball_velocity
 
 
 def random_actions(seed: int, n: int) -> Iterator[int]:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from replication import DemoError
+from replication import DemoError, Demos
 from replication.demos.files import demos_document, parse_demos
 from replication.demos.soccer_expert import demonstrate_soccer
 from replication.demos.strict_json import layout
@@ -14,10 +14,10 @@ from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import N_STATES, SoccerParams, encode
 
 
-def test_replay_is_what_the_world_does() -> None:
+def test_replay_is_what_the_world_does(soccer_demos: Demos) -> None:
     """States and the goal's step are those of the world, decision by decision."""
     field = SoccerField()
-    actions = demonstrate_soccer("s").correct[0].actions
+    actions = soccer_demos.correct[0].actions
     world = FastSoccerWorld()
     states = [world.reset(), *(world.step(int(action))[0] for action in actions)]
     assert field.replay(actions).tolist() == states
@@ -25,10 +25,10 @@ def test_replay_is_what_the_world_does() -> None:
     assert field.goal_step(actions[:-1]) is None
 
 
-def test_after_the_goal_nothing_moves() -> None:
+def test_after_the_goal_nothing_moves(soccer_demos: Demos) -> None:
     """Actions beyond the goal repeat the last state, and the goal keeps its step."""
     field = SoccerField()
-    actions = demonstrate_soccer("s").correct[0].actions
+    actions = soccer_demos.correct[0].actions
     longer = [*actions, 0, 1]
     assert field.replay(longer)[-3:].tolist() == [field.replay(actions)[-1]] * 3
     assert field.goal_step(longer) == len(actions)
@@ -55,14 +55,16 @@ def test_demos_survive_their_file() -> None:
         ({"drive_time": 0.41}, "environment: SoccerParams.drive_time = 0.41 is not accepted"),
         ({"rays": 0}, "environment: SoccerParams.rays = 0 is not accepted"),
         ({"speed": 0.05}, "environment: speed = 0.05 must be at least slow_speed"),
-        ({"kind": "socer"}, "environment.kind: unknown kind 'socer'; did you mean 'soccer'?"),
+        ({"kind": "socer"}, "environment.kind: unknown kind 'socer' (did you mean 'soccer'?)"),
         ({"raise": 1}, "environment: unknown field 'raise'"),
         ({"actions": ["forward"]}, "environment: 'actions' is"),
     ],
 )
-def test_bad_world_is_refused_in_one_line(change: dict[str, object], message: str) -> None:
+def test_bad_world_is_refused_in_one_line(
+    soccer_demos: Demos, change: dict[str, object], message: str
+) -> None:
     """A value that is not registered, or a misspelt field, is named with how to fix it."""
-    document = demos_document(demonstrate_soccer("s"))
+    document = demos_document(soccer_demos)
     document["environment"] |= change
     with pytest.raises(DemoError) as caught:
         parse_demos((layout(document) + "\n").encode())
@@ -70,9 +72,9 @@ def test_bad_world_is_refused_in_one_line(change: dict[str, object], message: st
     assert "\n" not in str(caught.value)
 
 
-def test_demo_that_does_not_fit_the_physics_is_refused() -> None:
+def test_demo_that_does_not_fit_the_physics_is_refused(soccer_demos: Demos) -> None:
     """States that another world would give are found at the first decision that differs."""
-    document = demos_document(demonstrate_soccer("s"))
+    document = demos_document(soccer_demos)
     document["environment"]["drive_time"] = 0.4
     with pytest.raises(
         DemoError, match=r"step \d+ of demo 'correct': 'forward' from \[\d+,\d+,0\]"

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import pytest
 
@@ -10,15 +9,7 @@ from replication.envs.soccer import rules
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.rules import BACKWARD, FORWARD, LEFT, RIGHT, SLOW, SoccerParams
 from replication.envs.soccer.world import SoccerWorld
-
-OVERLAP = 0.011  # contacts are noticed after bodies have moved on for a tick, at most 0.01 m
-
-
-def place(world: SoccerWorld, pose: Any = None, ball: Any = None, velocity: Any = None) -> None:
-    """Put the robot and the ball somewhere."""
-    world.pose = pose or world.pose
-    world.ball = ball or world.ball
-    world.ball_velocity = velocity or world.ball_velocity
+from tests.envs.soccer.placing import OVERLAP, place
 
 
 def test_ball_rolls_straight_and_slows() -> None:
