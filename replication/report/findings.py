@@ -1,4 +1,7 @@
-"""What the results mean, in words: sentences that notebooks show below their tables."""
+"""What the results mean, in words: sentences that notebooks show below their tables.
+
+One file because it is prose: each part is short, and none computes what a table does not have.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +44,7 @@ NAMES = {
     "ADABOOST-RULE": "the rule of AdaBoost-IRL",
 }
 """The choices of the factorial, in words."""
+
 
 # --- below the verdicts --------------------------------------------------------------------------
 

@@ -21,16 +21,15 @@ from replication.evidence.sensitivity import (
     UNDEFINED,
     _effects,
     _outcome,
-    ablations_table,
     effects_table,
     epsilon_squared,
     level_table,
-    numbers_table,
     outcome_shares,
     shares_table,
 )
 from replication.evidence.specifications import Specification
 from replication.evidence.statistics import mean_intervals, sd_ratio_intervals, share_interval
+from replication.evidence.sweep import ablations_table, numbers_table
 from replication.evidence.tables import pairs_near, read_table
 from replication.files import PROJECT
 from replication.trials.condition import Condition
