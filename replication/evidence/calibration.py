@@ -53,7 +53,7 @@ def grid_conditions(maze: Maze) -> dict[Point, Condition]:
     """Return the condition of each point: the unified method without incorrect demonstrations."""
     legs = {
         leg: demonstrate("open-maze", maze, params=Expert(leg=int(leg)))
-        for leg in dict.fromkeys(leg for leg, *_ in grid())
+        for leg in {leg for leg, *_ in grid()}
     }
     return {
         (leg, alpha, f_start, ties): Condition(
@@ -107,19 +107,9 @@ def calibration_table(results: Results, conditions: Mapping[Point, Condition]) -
 def check_table(grid_counts: NDArray[np.int64], trials: pd.DataFrame) -> pd.DataFrame:
     """Return how near the chosen point comes to the pair: in the grid, and in new trials.
 
-    Parameters
-    ----------
-    grid_counts
-        Iterations of the chosen point's trials in the grid, `[trial]`.
-    trials
-        The judged trials of the open maze, see :func:`replication.evidence.verdicts.judged_trials`.
-
-    Returns
-    -------
-    DataFrame
-        Mean and SD with their intervals, and where both would lie if the trials came from the
-        published distribution, as for the claims about published numbers. One row for the grid, and
-        one for the new trials under each reading of Eq. 9.
+    One row for its trials in the grid, `[trial]`, and one for the judged trials of the open maze
+    under each reading of Eq. 9: mean and SD with their intervals, and where both would lie if the
+    trials came from the published distribution, as for the claims about published numbers.
     """
     new = trials[trials["method"] == "unified"].groupby("reading", sort=False)["iterations"]
     runs = [("grid", "printed", grid_counts.astype(float))]

@@ -11,7 +11,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -20,6 +20,8 @@ from replication.errors import UserError, unknown
 from replication.evidence.statistics import CONFIDENCE
 from replication.irl import METHODS
 from replication.paper.published import Published
+
+FILE = Path(__file__).with_name("claims.toml")
 
 TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
 Reading = Literal["printed", "updated"]
@@ -55,7 +57,6 @@ LABELS = {
     "REWARD-TO-GOAL": "reward grows toward the goal",
 }
 """What each comparative claim says, in a few words, and on which task; a claim may have none."""
-
 
 EVIDENCE = {
     ("open-maze", "iterations"): "open_maze/contrasts",
@@ -102,11 +103,13 @@ class ClaimError(UserError):
     """A file of claims that cannot be used; the message is one line."""
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """A table of a file: no key may be unknown."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Claim(_Strict):
+class Claim(Strict):
     """One claim of the paper; ``claims.toml`` explains the fields.
 
     `paper` has mean, SD and number of trials by method; `used` gives the reason for no verdict, by
@@ -134,8 +137,8 @@ class Claim(_Strict):
         for method in (self.x, *filter(None, [self.y]), *self.paper):
             if method not in METHODS:
                 raise ValueError(f"there is no method {method!r}; known: {', '.join(METHODS)}")
-        if self.test != TESTS.get(self.statistic, "none"):
-            wanted = TESTS.get(self.statistic, "none")
+        wanted = TESTS.get(self.statistic, "none")
+        if self.test != wanted:
             raise ValueError(f"the test of {self.statistic!r} is {wanted!r}, not {self.test!r}")
         if (self.direction == "inside") != published:
             raise ValueError(f"{self.direction!r} does not go with {self.statistic!r}")
@@ -166,7 +169,7 @@ class Claim(_Strict):
         return sd if self.statistic == "published-sd" else mean
 
 
-class Judging(_Strict):
+class Judging(Strict):
     """What holds for all claims: the judging run, and the criterion's numbers."""
 
     root_seed: Annotated[int, Field(ge=0)]
@@ -186,14 +189,14 @@ class Judging(_Strict):
         return self
 
 
-class Explored(_Strict):
+class Explored(Strict):
     """Runs whose outcome was known when the criteria were frozen."""
 
     root_seeds: tuple[int, ...]
     what: str
 
 
-class Claims(_Strict):
+class Claims(Strict):
     """The whole file: the judging run, the claims, and what was run before."""
 
     judging: Judging
@@ -208,8 +211,8 @@ class Claims(_Strict):
                 raise ValueError(f"the claim {claim.id!r} is there twice")
             if claim.task not in self.judging.trials:
                 raise ValueError(f"judging.trials has no {claim.task!r}")
-        if any(self.judging.root_seed in run.root_seeds for run in self.explored):
-            seed = self.judging.root_seed
+        seed = self.judging.root_seed
+        if any(seed in run.root_seeds for run in self.explored):
             raise ValueError(f"root seed {seed} was explored; judge by one that never was")
         return self
 
@@ -230,7 +233,7 @@ class Claims(_Strict):
 @cache
 def load_claims() -> Claims:
     """Return the claims of the package."""
-    return parse_claims(_text())
+    return parse_claims(FILE.read_text(encoding="utf-8"))
 
 
 def parse_claims(text: str) -> Claims:
@@ -254,7 +257,7 @@ def parse_claims(text: str) -> Claims:
             entry = document["claim"][place[1]]
             name = entry.get("id", place[1]) if isinstance(entry, dict) else place[1]
             place[:2] = [f"claim {name}"]
-        where = ", ".join(["claims.toml", ".".join(map(str, place))] if place else ["claims.toml"])
+        where = "claims.toml" + (f", {'.'.join(map(str, place))}" if place else "")
         message = first["msg"].removeprefix("Value error, ")
         if first["type"] not in ("value_error", "missing"):
             message += f", not {first['input']!r:.80}"
@@ -263,16 +266,10 @@ def parse_claims(text: str) -> Claims:
 
 def criteria_hash() -> str:
     """Return the hash of the frozen file, which is written beside every verdict."""
-    return canonical_hash(_text())
+    return canonical_hash(FILE.read_text(encoding="utf-8"))
 
 
 def canonical_hash(text: str) -> str:
     """Return the SHA-256 of the values of a TOML text: layout, order and comments do not count."""
     document = json.dumps(tomllib.loads(text), sort_keys=True, separators=(",", ":"), default=str)
     return hashlib.sha256(document.encode()).hexdigest()
-
-
-def _text() -> str:
-    return (
-        resources.files("replication.evidence").joinpath("claims.toml").read_text(encoding="utf-8")
-    )

@@ -2,7 +2,7 @@
 
 Effects and intervals are those of the claims; only the number of bootstrap samples is smaller. A
 trial at the iteration cap counts as that many iterations here, and the number of such trials is
-reported.
+reported. One file because every table here is computed from that of the effects.
 """
 
 from __future__ import annotations
@@ -28,8 +28,6 @@ from replication.evidence.statistics import (
     share_interval,
     standard_errors,
 )
-from replication.evidence.tables import pairs_near
-from replication.evidence.variations import Ablation
 from replication.trials.condition import Condition
 from replication.trials.measures import measure_trials
 from replication.trials.results import Results
@@ -284,71 +282,3 @@ def level_table(effects: pd.DataFrame) -> pd.DataFrame:
 def _choices(effects: pd.DataFrame) -> pd.DataFrame:
     """Return the values, as text, that the specification of each row gives to its choices."""
     return pd.DataFrame(map(named_choices, effects["specification"]), index=effects.index)
-
-
-# --- ablations -----------------------------------------------------------------------------------
-
-
-def ablations_table(results: Results, conditions: Mapping[Ablation, Condition]) -> pd.DataFrame:
-    """Return one row a condition: a summary of its iterations, capped trials counting as the cap.
-
-    `more` is the mean number of iterations more than in the first condition, over the same seeds,
-    with its interval.
-    """
-    rows = []
-    first = results.iterations(next(iter(conditions.values())))
-    for (method, reading, choices), condition in conditions.items():
-        counts = results.iterations(condition).astype(float)
-        low, high = mean_intervals(np.stack([counts, counts - first]))
-        rows.append(
-            {
-                "method": method,
-                "reading": reading,
-                "choices": choices,
-                "n": len(counts),
-                "capped": int((~results.converged(condition)).sum()),
-                "mean": counts.mean(),
-                "low": low[0],
-                "high": high[0],
-                "sd": counts.std(ddof=1),
-                "median": float(np.median(counts)),
-                "more": (counts - first).mean(),
-                "more_low": low[1],
-                "more_high": high[1],
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def numbers_table(
-    results: Results, conditions: Mapping[tuple[int, str], Condition], *, paper: float
-) -> pd.DataFrame:
-    """Return one row for each number of incorrect demonstrations and reading of Eq. 9.
-
-    `saved` is the mean number of iterations fewer than without any, over the same seeds, with its
-    interval; `paper` the published saving. `pairs` and `leaving` count the marked pairs, see
-    :func:`replication.evidence.tables.pairs_near`.
-    """
-    rows = []
-    for (number, reading), condition in conditions.items():
-        counts = results.iterations(condition).astype(float)
-        saved = results.iterations(conditions[0, reading]) - counts
-        low, high = mean_intervals(np.stack([counts, saved]))
-        near = pairs_near(condition.selected)
-        rows.append(
-            {
-                "reading": reading,
-                "number": number,
-                "pairs": near["pairs"],
-                "leaving": near["leaving"],
-                "capped": int((~results.converged(condition)).sum()),
-                "mean": counts.mean(),
-                "low": low[0],
-                "high": high[0],
-                "saved": saved.mean(),
-                "saved_low": low[1],
-                "saved_high": high[1],
-                "paper": paper,
-            }
-        )
-    return pd.DataFrame(rows)

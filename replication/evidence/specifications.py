@@ -10,18 +10,20 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from replication.demos.checks import DemoError
 from replication.demos.files import load_demos
-from replication.evidence.claims import ClaimError, load_claims
+from replication.evidence.claims import ClaimError, Strict, load_claims
 from replication.evidence.experiments import EXPERIMENTS
 from replication.files import resolve
 from replication.paper.register import ChoiceError, Value, load_choices
+
+FILE = Path(__file__).with_name("specifications.toml")
 
 MAPS = ("open", "obstacles", "random-1", "random-2", "random-3")
 DEFAULT = "default"
@@ -36,11 +38,7 @@ Trials = Annotated[int, Field(ge=2)]
 """Intervals need two trials at least."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Single(_Strict):
+class Single(Strict):
     """Specifications that change one choice each."""
 
     trials: Trials
@@ -54,7 +52,7 @@ class Factorial(Single):
     seed: Seed
 
 
-class Mazes(_Strict):
+class Mazes(Strict):
     """What is declared for the mazes."""
 
     claims: tuple[str, ...]
@@ -62,14 +60,14 @@ class Mazes(_Strict):
     factorial: Factorial
 
 
-class Soccer(_Strict):
+class Soccer(Strict):
     """What is declared for robot soccer."""
 
     claims: tuple[str, ...]
     single: Single
 
 
-class Ablations(_Strict):
+class Ablations(Strict):
     """The method with parts of it switched off, and the number of incorrect demonstrations."""
 
     trials: Trials
@@ -78,7 +76,7 @@ class Ablations(_Strict):
     numbers: tuple[Annotated[int, Field(ge=0)] | Literal["all"], ...]
 
 
-class Declared(_Strict):
+class Declared(Strict):
     """The whole file."""
 
     root_seed: Seed
@@ -126,7 +124,7 @@ def sort_key(value: object) -> tuple[bool, float, str]:
 @cache
 def load_specifications() -> Declared:
     """Return the specifications of the package."""
-    return parse_specifications(_text())
+    return parse_specifications(FILE.read_text(encoding="utf-8"))
 
 
 def check_declared() -> None:
@@ -207,12 +205,6 @@ def parse_specifications(text: str) -> Declared:
                 f"balanced over {plan.mazes.factorial.size} specifications"
             )
     return plan
-
-
-def _text() -> str:
-    return (
-        resources.files("replication.evidence").joinpath("specifications.toml").read_text("utf-8")
-    )
 
 
 def _check_claim(id: str, task: str) -> None:

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+Array = NDArray[np.float64]
+
 CONFIDENCE = 0.95
 RESAMPLES = 9999
 RESAMPLES_OF_MANY = 1999
-BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change from run to run
+BOOTSTRAP_SEED = 95  # any fixed number: intervals must not change between runs
 
 FEWEST = 30
 """Trials below which a ratio of SDs gets no interval."""
@@ -60,8 +62,6 @@ class Comparison:
         Probability that a t-test at 5 % would find a true difference as large as the published
         one between samples that spread as ours do, taken as independent, since pairs that hardly
         differ say nothing about pairs that would; NaN where none is published.
-    n
-        Number of trials.
     """
 
     difference: float
@@ -79,7 +79,7 @@ class Comparison:
 
 
 def summarise(iterations: ArrayLike, converged: ArrayLike) -> Summary:
-    """Summarise the iterations of one condition, [trial], with whether each trial converged."""
+    """Summarise the iterations of one condition, [trial], and whether each trial converged."""
     counts, done = np.asarray(iterations, dtype=float), np.asarray(converged, dtype=bool)
     quartiles = np.quantile(counts, [0.5, 0.25, 0.75])
     if done.all():
@@ -99,9 +99,9 @@ def compare(
     Parameters
     ----------
     x, y
-        Iterations of two conditions over the same seeds.
+        Iterations over the same seeds.
     capped
-        Whether any trial of either ended at the cap; then every statistic is NaN.
+        Whether any trial ended at the cap; then every statistic is NaN.
     published
         The paper's own difference of means, for the power.
     """
@@ -111,9 +111,8 @@ def compare(
     low, high = mean_interval(a - b)
     equal = bool((a == b).all())
     flat = a.std() == 0 or b.std() == 0
-    few = flat or len(a) < FEWEST
     sd_bounds: Any = (np.nan, np.nan)
-    if not few:
+    if not flat and len(a) >= FEWEST:
         sd_bounds = _bootstrap((a, b), _sd_ratio, RESAMPLES, rounding=1e-12)
     moments = [moment for s in (a, b) for moment in (s.mean(), s.std(ddof=1), len(s))]
     with np.errstate(divide="ignore", invalid="ignore"):  # samples that do not spread
@@ -135,7 +134,7 @@ def compare(
     )
 
 
-def mean_interval(differences: NDArray[np.float64]) -> tuple[float, float]:
+def mean_interval(differences: Array) -> tuple[float, float]:
     """Return the BCa bootstrap interval of a mean; a constant sample is its own interval."""
     if np.ptp(differences) == 0:
         return float(differences[0]), float(differences[0])
@@ -143,14 +142,12 @@ def mean_interval(differences: NDArray[np.float64]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def mean_intervals(samples: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
+def mean_intervals(samples: Array) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the BCa intervals of many means at once: bounds [sample] of values [sample, trial]."""
     return _bootstrap((samples,), np.mean, RESAMPLES_OF_MANY)
 
 
-def sd_ratio_intervals(
-    x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def sd_ratio_intervals(x: Array, y: Array) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Return many ratios of SDs at once, with their BCa intervals; NaN where either is constant."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _sd_ratio(x, y)
@@ -160,19 +157,17 @@ def sd_ratio_intervals(
     return bounds[0], bounds[1], bounds[2]
 
 
-def standard_errors(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+def standard_errors(low: Array, high: Array) -> Array:
     """Return the standard errors that intervals imply, if estimates are about normal."""
     return (high - low) / (2 * _normal())
 
 
-def _sd_ratio(
-    a: NDArray[np.float64], b: NDArray[np.float64], axis: int = -1
-) -> NDArray[np.float64]:
+def _sd_ratio(a: Array, b: Array, axis: int = -1) -> Array:
     return np.std(a, axis=axis, ddof=1) / np.std(b, axis=axis, ddof=1)
 
 
 def _bootstrap(
-    samples: tuple[NDArray[np.float64], ...],
+    samples: tuple[Array, ...],
     statistic: Callable[..., Any],
     resamples: int,
     *,
@@ -204,16 +199,9 @@ def _bootstrap(
 
 
 def power(sd: float, n: int, effect: float) -> float:
-    """Return the power of a two-sided t-test at 5 % for a true mean difference `effect`.
+    """Return the power of a two-sided t-test at 5 % of `n` differences that spread by `sd`.
 
-    Parameters
-    ----------
-    sd
-        Standard deviation of a single difference.
-    n
-        Number of differences.
-    effect
-        The true mean difference.
+    `effect` is the true mean difference.
     """
     if not np.isfinite(effect) or sd == 0:
         return float("nan")
@@ -229,7 +217,7 @@ def mean_prediction(mean: float, sd: float, n: int, m: int) -> tuple[float, floa
     return float(mean - half), float(mean + half)
 
 
-def sd_prediction(sd: float, n: int, sample: NDArray[np.float64]) -> tuple[float, float]:
+def sd_prediction(sd: float, n: int, sample: Array) -> tuple[float, float]:
     """Return where the SD of `sample` should lie, given the SD of `n` trials before.
 
     The logarithm of an SD is taken as normal, with the variance (kurtosis - 1) / (4 n) that it has
@@ -239,13 +227,13 @@ def sd_prediction(sd: float, n: int, sample: NDArray[np.float64]) -> tuple[float
     return float(sd * np.exp(-half)), float(sd * np.exp(half))
 
 
-def sd_interval(sample: NDArray[np.float64]) -> tuple[float, float]:
+def sd_interval(sample: Array) -> tuple[float, float]:
     """Return the interval of an SD, by the same approximation as :func:`sd_prediction`."""
     sd, half = sample.std(ddof=1), _normal() * np.sqrt(_log_sd_variance(sample))
     return float(sd * np.exp(-half)), float(sd * np.exp(half))
 
 
-def _log_sd_variance(sample: NDArray[np.float64]) -> float:
+def _log_sd_variance(sample: Array) -> float:
     if np.ptp(sample) == 0:
         return float("nan")
     return float((stats.kurtosis(sample, fisher=False) - 1) / (4 * len(sample)))
@@ -267,7 +255,7 @@ def share_interval(k: int, n: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def holm(p_values: Sequence[float]) -> NDArray[np.float64]:
+def holm(p_values: Sequence[float]) -> Array:
     """Return p-values adjusted by Holm's method for making several comparisons.
 
     Examples

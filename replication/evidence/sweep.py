@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import pandas as pd
 
 from replication.evidence.claims import Claim, load_claims
 from replication.evidence.experiments import Key
-from replication.evidence.sensitivity import ablations_table, effects_table, numbers_table
+from replication.evidence.sensitivity import effects_table
 from replication.evidence.specifications import (
     Specification,
     factorial_specifications,
     load_specifications,
     single_specifications,
 )
+from replication.evidence.statistics import mean_intervals
+from replication.evidence.tables import pairs_near
 from replication.evidence.variations import (
+    Ablation,
     ablation_conditions,
     maze_conditions,
     numbered_conditions,
@@ -100,3 +104,68 @@ class Sweep:
             seed=self.seed,
             traced=False,
         )
+
+
+def ablations_table(results: Results, conditions: Mapping[Ablation, Condition]) -> pd.DataFrame:
+    """Return one row a condition: a summary of its iterations, capped trials counting as the cap.
+
+    `more` is the mean number of iterations more than in the first condition, over the same seeds,
+    with its interval.
+    """
+    rows = []
+    first = results.iterations(next(iter(conditions.values())))
+    for (method, reading, choices), condition in conditions.items():
+        counts = results.iterations(condition).astype(float)
+        low, high = mean_intervals(np.stack([counts, counts - first]))
+        rows.append(
+            {
+                "method": method,
+                "reading": reading,
+                "choices": choices,
+                "n": len(counts),
+                "capped": int((~results.converged(condition)).sum()),
+                "mean": counts.mean(),
+                "low": low[0],
+                "high": high[0],
+                "sd": counts.std(ddof=1),
+                "median": float(np.median(counts)),
+                "more": (counts - first).mean(),
+                "more_low": low[1],
+                "more_high": high[1],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def numbers_table(
+    results: Results, conditions: Mapping[tuple[int, str], Condition], *, paper: float
+) -> pd.DataFrame:
+    """Return one row for each number of incorrect demonstrations and reading of Eq. 9.
+
+    `saved` is the mean number of iterations fewer than without any, over the same seeds, with its
+    interval; `paper` the published saving. `pairs` and `leaving` count the marked pairs, see
+    :func:`replication.evidence.tables.pairs_near`.
+    """
+    rows = []
+    for (number, reading), condition in conditions.items():
+        counts = results.iterations(condition).astype(float)
+        saved = results.iterations(conditions[0, reading]) - counts
+        low, high = mean_intervals(np.stack([counts, saved]))
+        near = pairs_near(condition.selected)
+        rows.append(
+            {
+                "reading": reading,
+                "number": number,
+                "pairs": near["pairs"],
+                "leaving": near["leaving"],
+                "capped": int((~results.converged(condition)).sum()),
+                "mean": counts.mean(),
+                "low": low[0],
+                "high": high[0],
+                "saved": saved.mean(),
+                "saved_low": low[1],
+                "saved_high": high[1],
+                "paper": paper,
+            }
+        )
+    return pd.DataFrame(rows)

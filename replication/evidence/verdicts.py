@@ -1,4 +1,7 @@
-"""Judge the paper's claims by the frozen criteria of :mod:`replication.evidence.claims`."""
+"""Judge the paper's claims by the frozen criteria of :mod:`replication.evidence.claims`.
+
+One file because a verdict is read with the numbers and the reason that stand beside it.
+"""
 
 from __future__ import annotations
 
@@ -37,15 +40,7 @@ def read_trials(figures: Path) -> pd.DataFrame:
 
 
 def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:
-    """Return the trials that count: those of the main conditions, as many as are to be judged.
-
-    Parameters
-    ----------
-    trials
-        Of :func:`read_trials`, or one of the tables.
-    judging
-        How many trials of each task are judged.
-    """
+    """Return the trials that count: those of the main conditions, as many as are to be judged."""
     main = main_trials(trials)
     return main[main["trial"] < main["task"].map(dict(judging.trials))]
 
@@ -56,8 +51,7 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
     Parameters
     ----------
     measures
-        The trials of all tasks, see :func:`judged_trials`; the columns are those of
-        :func:`replication.trials.measures.measure_trials`.
+        The trials of all tasks, see :func:`judged_trials`.
     claims
         What to judge, and how.
 
@@ -171,14 +165,12 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
         share, n = min((values.mean(), len(values)) for values in (a, b))
         low, high = share_interval(round(share * n), n)
         return {"effect": share, "low": low, "high": high}
-    done = x["converged"].all() and y["converged"].all()
-    if not done:  # a trial at the cap has no count
+    if not (x["converged"].all() and y["converged"].all()):  # at the cap there is no count
         return {}
     if claim.statistic in ("mean-difference", "mean"):
-        published = claim.paper_effect if claim.paper else np.nan
-        against = b if claim.y else np.full(len(a), claim.margin)
-        result = compare(a, against, published=published)
         shift = 0.0 if claim.y else claim.margin
+        against = b if claim.y else np.full(len(a), shift)
+        result = compare(a, against, published=claim.paper_effect)
         return {
             "effect": result.difference + shift,
             "low": result.low + shift,
@@ -189,12 +181,8 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
         }
     if claim.statistic == "sd-ratio":
         result = compare(a, b)
-        return {
-            "effect": result.sd_ratio,
-            "low": result.sd_low,
-            "high": result.sd_high,
-            "p": result.p_spread,
-        }
+        bounds = {"low": result.sd_low, "high": result.sd_high}
+        return {"effect": result.sd_ratio, **bounds, "p": result.p_spread}
     ours = summarise(a, x["converged"])
     if claim.statistic == "published-run":
         low, high = np.quantile(a, [0.025, 0.975])
@@ -205,7 +193,8 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
         moments = {"effect": ours.mean, "low": ours.low, "high": ours.high}
     else:
         low, high = sd_prediction(paper.sd, paper.n, a)
-        moments = dict(zip(("effect", "low", "high"), (ours.sd, *sd_interval(a)), strict=True))
+        sd_low, sd_high = sd_interval(a)
+        moments = {"effect": ours.sd, "low": sd_low, "high": sd_high}
     return moments | {"predicted_low": low, "predicted_high": high}
 
 
@@ -229,13 +218,12 @@ def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
             return REPRODUCED, ""
         return NOT_REPRODUCED, "ours lies outside the range that the paper's predicts"
     verdict = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
-    excluded = not row.low <= claim.margin <= row.high
-    if verdict == UNDECIDED and excluded:
-        return verdict, "the interval excludes the margin, but the test does not reject"
-    if verdict == UNDECIDED:
-        return verdict, "the test rejects, but the interval includes the margin"
-    if verdict != NOT_REPRODUCED:
+    if verdict in (REPRODUCED, REVERSED):
         return verdict, ""
+    if verdict == UNDECIDED:
+        if row.low <= claim.margin <= row.high:
+            return verdict, "the test rejects, but the interval includes the margin"
+        return verdict, "the interval excludes the margin, but the test does not reject"
     if np.isnan(row.paper):
         return verdict, "the interval includes the margin"
     included = "and" if row.low <= row.paper <= row.high else "but not"

@@ -187,7 +187,7 @@ def numbers(table: pd.DataFrame) -> Picture:
     Parameters
     ----------
     table
-        Of :func:`replication.evidence.sensitivity.numbers_table`.
+        Of :func:`replication.evidence.sweep.numbers_table`.
     """
     parts = []
     for reading, rows in table.groupby("reading", sort=False):

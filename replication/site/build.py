@@ -20,7 +20,7 @@ from replication.pipeline.manifest import FRESH, read_runs
 from replication.pipeline.notebook import EXECUTED
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
-from replication.report.findings import findings_context
+from replication.report.findings import holding
 from replication.site import overview
 from replication.site.findings import render_findings
 from replication.site.pages import Origin, link_pages, page
@@ -152,11 +152,13 @@ def _prose(generated: Mapping[str, str]) -> dict[str, str]:
 def _generated(out: Path) -> dict[str, str]:
     """Return what the site computes from the published tables: parts of pages, and a page."""
     judged = read_table(out / "claims" / "verdicts.csv")
+    effects = read_table(out / "sensitivity" / "effects.csv")
+    holds = {id: holding(effects, id) for id in judged["id"].unique()}
     findings, answer = render_findings(out)
     return {
         "answer": answer,
         "findings.md": findings,
-        "verdicts": overview.verdicts(judged, findings_context(out)["holds"]),
+        "verdicts": overview.verdicts(judged, holds),
         "published": overview.published(judged),
         "choices": overview.choices(read_table(out / "sensitivity" / "shares.csv")),
         "citation": overview.citation((files.PROJECT / "CITATION.cff").read_text("utf-8")),

@@ -49,7 +49,7 @@ def stored() -> pd.DataFrame:
 
 @pytest.mark.parametrize(("mean", "sd"), [(40.1, 4.73), (39.1, 5.2), (45.0, 3.0), (30.0, 9.0)])
 def test_kl_divergence_by_integration(mean: float, sd: float) -> None:
-    """The closed form is the integral of p log(p / q), p being the published distribution."""
+    """It is the integral of p log(p / q), p being the published one; infinite with no spread."""
     p, q = stats.norm(PAIR.mean, PAIR.sd), stats.norm(mean, sd)
     expected, _ = integrate.quad(
         lambda x: p.pdf(x) * (p.logpdf(x) - q.logpdf(x)),
@@ -57,6 +57,8 @@ def test_kl_divergence_by_integration(mean: float, sd: float) -> None:
         PAIR.mean + 12 * PAIR.sd,
     )
     assert kl_divergence(mean, sd, PAIR) == pytest.approx(expected, abs=1e-7)
+    for out in ((mean, 0.0), (np.nan, np.nan), (mean, np.nan)):
+        assert kl_divergence(*out, PAIR) == np.inf
 
 
 @given(st.floats(1, 100), st.floats(0.1, 50), st.floats(1, 100), st.floats(0.1, 50))
@@ -81,12 +83,6 @@ def test_kl_divergence_is_the_likelihood_of_the_published_sample() -> None:
         zip(likelihoods, kl_divergences, strict=True), 2
     ):
         assert a - b == pytest.approx(other - one)
-
-
-@pytest.mark.parametrize(("mean", "sd"), [(40.1, 0.0), (np.nan, np.nan), (40.1, np.nan)])
-def test_points_that_are_out_are_infinitely_far(mean: float, sd: float) -> None:
-    """A point without any spread, or with a trial at the cap, is never the nearest."""
-    assert kl_divergence(mean, sd, PAIR) == np.inf
 
 
 # --- the grid --------------------------------------------------------------------------------
@@ -181,14 +177,10 @@ def test_check_holds_new_trials_against_the_published_distribution() -> None:
 # --- the published grid ----------------------------------------------------------------------
 
 
-def test_defaults_are_the_nearest_point(stored: pd.DataFrame) -> None:
-    """The first row of the published grid is what the register has, and the only default."""
+def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
+    """Each point is there once with the declared trials, the nearest first: the only default."""
     assert tuple(stored.loc[0, list(CALIBRATED)]) == chosen()
     assert stored["default"].tolist() == [True] + [False] * 119
-
-
-def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
-    """Each point is there once with the declared number of trials, the nearest first."""
     points = set(stored[list(CALIBRATED)].itertuples(index=False, name=None))
     assert points == set(grid())
     assert set(stored["n"]) == {TRIALS}

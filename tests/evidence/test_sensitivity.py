@@ -9,9 +9,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from replication import Demos
 from replication.evidence.claims import Claim, load_claims
-from replication.evidence.experiments import method_conditions
 from replication.evidence.sensitivity import (
     HOLDS,
     NOISE,
@@ -21,25 +19,19 @@ from replication.evidence.sensitivity import (
     UNDEFINED,
     _effects,
     _outcome,
-    ablations_table,
     effects_table,
     epsilon_squared,
     level_table,
-    numbers_table,
     outcome_shares,
     shares_table,
 )
 from replication.evidence.specifications import Specification
 from replication.evidence.statistics import mean_intervals, sd_ratio_intervals, share_interval
-from replication.evidence.tables import pairs_near, read_table
+from replication.evidence.tables import read_table
 from replication.files import PROJECT
-from replication.trials.condition import Condition
 from replication.trials.measures import measure_trials
-from replication.trials.results import Results
-from replication.trials.run import run_trials
-from replication.trials.store import Store
+from tests.evidence.conftest import Run
 
-FEW = {"episodes": 100, "horizon": 40}
 CHOICES: dict[str, tuple[Any, ...]] = {
     "ALPHA": (0.1, 0.3, 0.5, 0.9),
     "TIES": ("random", "first"),
@@ -108,7 +100,7 @@ def test_outcome_by_hand(id: str, effect: float, low: float, high: float, expect
 
 
 def test_effects_of_many_rows_are_those_of_each() -> None:
-    """Each statistic is computed row by row, [specification, trial]."""
+    """Each statistic is computed row by row, [specification, trial]; published ones have none."""
     rng = np.random.default_rng(1)
     x, y = rng.normal(36, 4, (4, 12)), rng.normal(40, 8, (4, 12))
     one = load_claims().by_id
@@ -122,12 +114,8 @@ def test_effects_of_many_rows_are_those_of_each() -> None:
     effect, low, high = _effects(one("ZERO-OPEN"), done, done[::-1])
     assert effect.tolist() == [0.75, 0.75]
     assert (low[0], high[0]) == share_interval(9, 12)
-
-
-def test_published_numbers_have_no_effect_here() -> None:
-    """A claim about a published number cannot be evaluated under a specification."""
     with pytest.raises(AssertionError, match="MEAN-UNIFIED-OPEN has no effect"):
-        _effects(load_claims().by_id("MEAN-UNIFIED-OPEN"), np.ones((1, 3)), np.ones((1, 3)))
+        _effects(one("MEAN-UNIFIED-OPEN"), x, y)
 
 
 def test_shares_of_outcomes_by_hand() -> None:
@@ -210,23 +198,13 @@ def test_choices_that_act_together_are_in_the_rest() -> None:
 
 
 def test_ratios_enter_by_their_logarithm() -> None:
-    """Halving and doubling weigh alike: a ratio's shares are those of its logarithm."""
-    specifications = crossed(times=10)
-    rng = np.random.default_rng(6)
-    logs = rng.normal(0, 0.5, len(specifications))
-    ratios = effects(specifications, np.exp(logs), statistic="sd-ratio")
-    ratios["low"], ratios["high"] = np.exp(logs - 0.2), np.exp(logs + 0.2)
-    other = effects(specifications, logs, half=0.2)
-    assert shares_of(ratios) == pytest.approx(shares_of(other))
-
-
-def test_ratio_interval_that_reaches_zero_gives_no_infinite_noise() -> None:
-    """A resample may have no spread at all: such an interval says nothing of the noise."""
+    """Halving and doubling weigh alike; an interval that reaches 0 says nothing of the noise."""
     specifications = crossed(times=10)
     logs = np.random.default_rng(6).normal(0, 0.5, len(specifications))
+    expected = shares_of(effects(specifications, logs, half=0.2))
     ratios = effects(specifications, np.exp(logs), statistic="sd-ratio")
     ratios["low"], ratios["high"] = np.exp(logs - 0.2), np.exp(logs + 0.2)
-    expected = shares_of(ratios)
+    assert shares_of(ratios) == pytest.approx(expected)
     ratios.loc[3, "low"] = 0.0
     assert shares_of(ratios) == pytest.approx(expected)
 
@@ -242,19 +220,15 @@ def test_missing_effects_are_left_out() -> None:
     assert shares_of(pd.concat([table, more])) == pytest.approx(expected)
 
 
-def test_too_few_specifications_give_no_shares() -> None:
-    """With fewer specifications than values the shares of choices are unknown, not zero."""
+def test_shares_that_cannot_be_known_are_not_zero() -> None:
+    """Fewer specifications than values have none, nor do effects that do not vary."""
     few = [crossed()[at] for at in (0, 4, 8, 12, 17, 22)]
     found = shares_of(effects(few, np.arange(6.0)))
     assert np.isnan([found[id] for id in (*CHOICES, "rest")]).all()
-
-
-def test_effects_that_do_not_vary_have_no_shares() -> None:
-    """Where all effects are equal there is no variance to share."""
     many = crossed(times=10)
-    found = epsilon_squared(effects(many, np.ones(len(many))))
-    assert found.empty
-    assert found.columns.tolist() == ["claim", "choice", "share"]
+    none = epsilon_squared(effects(many, np.ones(len(many))))
+    assert none.empty
+    assert none.columns.tolist() == ["claim", "choice", "share"]
 
 
 def test_table_of_shares_has_the_outcomes_too() -> None:
@@ -337,24 +311,6 @@ def test_published_effects_have_their_outcomes(published: pd.DataFrame) -> None:
 
 # --- tiny runs -------------------------------------------------------------------------------
 
-Run = tuple[Results, dict[Specification, dict[tuple[str, str], Condition]]]
-
-
-@pytest.fixture(scope="module")
-def tiny(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run two specifications, the second with a cap that most trials reach, and one method less."""
-    usual = method_conditions(small_demos, FEW)
-    capped = method_conditions(small_demos, {**FEW, "max_iterations": 5})
-    conditions = {
-        Specification("single", ()): {k: one for k, one in usual.items() if k[1] != "updated"},
-        Specification("single", (("ITERATION-CAP", 5),)): {
-            k: one for k, one in capped.items() if k[1] != "printed" and k[0] != "adaboost"
-        },
-    }
-    store = Store(tmp_path_factory.mktemp("sensitivity") / "trials.sqlite")
-    every = [one for own in conditions.values() for one in own.values()]
-    return run_trials(every, trials=6, store=store, seed=2), conditions
-
 
 def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     """Effects equal the statistics of the trials; capped trials count as the cap and are told."""
@@ -390,52 +346,3 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     assert some["claim"].tolist() == ["SAVES-OPEN", "Q-GROWS"]  # none has AdaBoost-IRL
     assert table[table["specification"] == "default"]["capped"].tolist() == [0] * 4
     assert (table[table["specification"] != "default"]["capped"] > 0).all()
-
-
-def test_ablations_are_summaries_of_the_trials(tiny: Run) -> None:
-    """Each row has the mean, SD and median of its own trials, and counts those at the cap."""
-    results, conditions = tiny
-    named = {
-        (*key, str(n)): condition
-        for n, run in enumerate(conditions.values())
-        for key, condition in run.items()
-    }
-    table = ablations_table(results, named)
-    keys = table[["method", "reading", "choices"]].itertuples(index=False, name=None)
-    assert list(keys) == list(named)
-    for row, condition in zip(table.itertuples(), named.values(), strict=True):
-        counts = results.iterations(condition)
-        assert (row.n, row.capped) == (6, (~results.converged(condition)).sum())
-        assert (row.mean, row.median) == (counts.mean(), np.median(counts))
-        assert row.sd == pytest.approx(counts.std(ddof=1))
-        assert row.low <= row.mean <= row.high
-        more = counts - results.iterations(next(iter(named.values())))
-        assert row.more == pytest.approx(more.mean())
-        assert row.more_low <= row.more <= row.more_high
-    assert (table.loc[0, ["more", "more_low", "more_high"]] == 0).all()
-    assert table["capped"].iloc[-1] > 0
-
-
-def test_numbers_save_against_none(small_demos: Demos, tiny: Run, tmp_path: Any) -> None:
-    """What n incorrect demonstrations save is against none, over the same seeds and reading."""
-    usual = method_conditions(small_demos, FEW)
-    conditions = {
-        (n, f): usual["unified-incorrect" if n else "unified", f]
-        for n in (0, 9)
-        for f in ("printed", "updated")
-    }
-    store = Store(tmp_path / "trials.sqlite")
-    results = run_trials(list(conditions.values()), trials=6, store=store, seed=2)
-    table = numbers_table(results, conditions, paper=3.62)
-    assert set(table["paper"]) == {3.62}
-    assert list(zip(table["number"], table["reading"], strict=True)) == list(conditions)
-    for row in table.itertuples():
-        counts = results.iterations(conditions[row.number, row.reading])
-        saved = results.iterations(conditions[0, row.reading]) - counts
-        assert (row.mean, row.saved) == (counts.mean(), saved.mean())
-        assert row.low <= row.mean <= row.high
-        assert row.saved_low <= row.saved <= row.saved_high
-        near = pairs_near(conditions[row.number, row.reading].selected)
-        assert (row.pairs, row.leaving) == (near["pairs"], near["leaving"])
-    none = table[table["number"] == 0]
-    assert (none[["pairs", "saved", "saved_low", "saved_high"]] == 0).all(axis=None)

@@ -86,10 +86,11 @@ def test_every_open_choice_of_the_mazes_is_varied() -> None:
 
 
 def test_factors_are_balanced() -> None:
-    """Each value of a choice stands in equally many specifications."""
+    """Each value of a choice stands in equally many specifications, its default among them."""
     for id, values in PLAN.mazes.factorial.choices.items():
         counts = Counter(dict(one.choices)[id] for one in FACTORIAL)
         assert counts == dict.fromkeys(values, PLAN.mazes.factorial.size // len(values))
+        assert default_of(id) in values
 
 
 def test_factors_are_nearly_uncorrelated() -> None:
@@ -107,12 +108,6 @@ def test_factors_are_nearly_uncorrelated() -> None:
     ]
     assert max(found) < 4 / 240**0.5  # four standard errors
     assert np.mean(found) < 1 / 240**0.5
-
-
-def test_every_default_stands_in_the_factorial() -> None:
-    """The defaults are among the crossed values, so that levels can be compared with them."""
-    for id, values in PLAN.mazes.factorial.choices.items():
-        assert default_of(id) in values
 
 
 def test_factorial_depends_on_its_seed_alone() -> None:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from jinja2 import Environment, StrictUndefined
 from scipy import stats
 
 from replication.evidence.calibration import CALIBRATED, PAIR, TRIALS, chosen, grid, kl_divergence
@@ -22,7 +21,6 @@ from replication.report.findings import (
     caveats,
     chance,
     dependence,
-    findings_context,
     one_at_a_time,
     rechecked,
 )
@@ -240,16 +238,3 @@ def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
     held = table[table["outcome"] == HOLDS]["capped"].eq(10)
     few, most = sorted((held.sum() / 40, (~held).sum() / 40))
     assert f"with its 2 values in {few:.0%} to {most:.0%} of the specifications" in chance(table)
-
-
-# --- the page of findings --------------------------------------------------------------------
-
-
-def test_template_has_all_its_numbers() -> None:
-    """Every name in the template of findings is among the numbers."""
-    template = PROJECT / "docs" / "findings.md.jinja"
-    if not (template.exists() and (FIGURES / "claims").exists()):
-        pytest.skip("figures/ or the template is not published yet")
-    environment = Environment(undefined=StrictUndefined, autoescape=False)
-    text = environment.from_string(template.read_text("utf-8")).render(findings_context(FIGURES))
-    assert "**Faster than AdaBoost-IRL**: holds in" in text

@@ -4,7 +4,6 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
@@ -31,8 +30,7 @@ def project(toy_project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(build, "_generated", lambda out: {"verdicts": "all of them"})
     write_file(toy_project / "docs" / "conf.py", CONF)
     write_file(toy_project / "docs" / "index.md", INDEX.format(text="Some prose."))
-    write(toy_project)
-    run(toy_project)
+    run_notebooks([write(toy_project)], profile="paper", out=toy_project / "figures")
     monkeypatch.setattr(execute, "execute", lambda *_, **__: pytest.fail("executed"))
     return toy_project
 
@@ -48,82 +46,78 @@ def write(project: Path, code: str = "x = 1", prose: str = "# A toy") -> Path:
     return path
 
 
-def run(project: Path, **options: Any) -> None:
-    """Run the notebook into `figures`."""
-    notebook = project / "notebooks" / "toy.ipynb"
-    run_notebooks([notebook], profile="paper", out=project / "figures", **options)
+@pytest.fixture
+def no_sphinx(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each page be its source; like Sphinx, keep the pages that are there."""
+
+    def write(work: Path) -> None:
+        for path in (work / "source").glob("*.md"):
+            write_file(work / "html" / f"{path.stem}.html", path.read_text(encoding="utf-8"))
+        write_file(work / "html" / build.INDEX, "")
+
+    monkeypatch.setattr(build, "_write", write)
 
 
-def built(project: Path) -> str:
-    """Build the site; return its page of the notebook."""
+def built(project: Path) -> Path:
+    """Build the site; return its folder."""
     first = build_site([project / "notebooks" / "toy.ipynb"], project / "site")
     assert first == project / "site" / "index.html"
-    return (project / "site" / "notebooks" / "toy.html").read_text(encoding="utf-8")
+    return first.parent
 
 
-def test_nothing_is_executed(project: Path) -> None:
-    """The site has the notebook's page and that of the prose, from what was published."""
-    assert "A toy" in built(project)
-    assert "Some prose." in (project / "site" / "index.html").read_text(encoding="utf-8")
+def test_a_site_follows_its_sources(project: Path) -> None:
+    """Without executing anything, new words reach their page and new titles all pages."""
+    (project / "docs" / "other.md").write_text("---\norphan: true\n---\n# Other\n")
+    site = built(project)
+    index, notebook = site / "index.html", site / "notebooks" / "toy.html"
+    assert "Some prose." in index.read_text("utf-8")
+    assert "A toy" in notebook.read_text("utf-8")
 
-
-def test_a_stale_notebook_stops_the_build(project: Path) -> None:
-    """A stale notebook is named, with the reason and what to do; the old site stays."""
+    work = project / "build" / "site-work"
+    others = [work / "source" / "other.md", work / "html" / "other.html"]
+    before = [path.stat().st_mtime_ns for path in others]
+    (project / "docs" / "index.md").write_text(INDEX.format(text="Other prose."))
+    write(project, prose="# A toy\n\nMore words.")
     built(project)
-    before = (project / "site" / "index.html").read_bytes()
+    assert "Other prose." in index.read_text("utf-8")
+    assert "More words." in notebook.read_text("utf-8")
+    assert [path.stat().st_mtime_ns for path in others] == before
+    assert list(verify_outputs(project / "figures")) == []
+
+    (project / "docs" / "index.md").write_text(INDEX.format(text="[gone](nowhere.md)"))
+    with pytest.raises(SiteError, match=r"the pages cannot be written: index\.md.*nowhere"):
+        built(project)
+    assert "Other prose." in index.read_text("utf-8")
+
+    text = INDEX.format(text="Fixed.").replace("Toy report", "New report")
+    (project / "docs" / "index.md").write_text(text)
+    built(project)
+    assert "Fixed." in index.read_text("utf-8")
+    assert "New report" in notebook.read_text("utf-8")
+
+
+@pytest.mark.usefixtures("no_sphinx")
+def test_a_stale_or_missing_notebook_stops_the_build(project: Path) -> None:
+    """It is named, with the reason and what to do; the site that is there stays."""
+    before = (built(project) / "index.html").read_bytes()
     write(project, code="x = 2")
     why = "the notebook's code has changed"
     with pytest.raises(SiteError, match=f"toy is stale: {why}; first: replicate run toy"):
         built(project)
-    assert (project / "site" / "index.html").read_bytes() == before
-
-
-def test_a_missing_notebook_stops_the_build(project: Path) -> None:
-    """Without any outputs the notebook is named, too."""
     shutil.rmtree(project / "figures")
     with pytest.raises(SiteError, match="toy is missing; first: replicate run toy"):
         built(project)
+    assert (project / "site" / "index.html").read_bytes() == before
 
 
-def test_new_text_is_taken_over(project: Path) -> None:
-    """Prose of a notebook reaches its page without a run, and the manifest stays true."""
-    built(project)
-    write(project, prose="# A game")
-    assert "A game" in built(project)
-    assert list(verify_outputs(project / "figures")) == []
-
-
-def test_only_what_changed_is_written(project: Path) -> None:
-    """New prose on one page leaves the files of the others alone, and an equal build leaves all."""
-    built(project)
-    source, html = (project / "build" / "site-work" / part for part in ("source", "html"))
-    before = {path: path.stat().st_mtime_ns for path in source.rglob("*.*")}
-    page = (html / "notebooks" / "toy.html").stat().st_mtime_ns
-    (project / "docs" / "index.md").write_text(INDEX.format(text="Other prose."))
-    built(project)
-    changed = {path.name for path, stamp in before.items() if path.stat().st_mtime_ns != stamp}
-    assert changed == {"index.md"}
-    assert (html / "notebooks" / "toy.html").stat().st_mtime_ns == page
-    assert "Other prose." in (project / "site" / "index.html").read_text(encoding="utf-8")
-
-
-def test_a_new_title_reaches_every_page(project: Path) -> None:
-    """Where titles or their order change, all pages are written: each shows them at its side."""
-    built(project)
-    text = INDEX.format(text="Some prose.").replace("Toy report", "Other report")
-    (project / "docs" / "index.md").write_text(text)
-    assert "Other report" in built(project)
-
-
+@pytest.mark.usefixtures("no_sphinx")
 def test_what_is_gone_leaves_the_site(project: Path) -> None:
     """A page whose source was removed is not on the site any more."""
     extra = project / "docs" / "extra.md"
-    extra.write_text("---\norphan: true\n---\n# Extra\n")
-    built(project)
-    assert (project / "site" / "extra.html").exists()
+    extra.write_text("# Extra")
+    assert (built(project) / "extra.html").exists()
     extra.unlink()
-    built(project)
-    assert not (project / "site" / "extra.html").exists()
+    assert not (built(project) / "extra.html").exists()
 
 
 def test_other_folders_are_left_alone(project: Path) -> None:
@@ -133,17 +127,6 @@ def test_other_folders_are_left_alone(project: Path) -> None:
     with pytest.raises(SiteError, match="site holds other files than a site; choose another"):
         built(project)
     assert thesis.read_text() == "years of work"
-
-
-def test_a_broken_page_is_named(project: Path) -> None:
-    """A link that leads nowhere is one error with the page's name, and the old site stays."""
-    built(project)
-    (project / "docs" / "index.md").write_text(INDEX.format(text="[gone](nowhere.md)"))
-    with pytest.raises(SiteError, match=r"the pages cannot be written: index\.md.*nowhere"):
-        built(project)
-    assert (project / "site" / "index.html").exists()
-    (project / "docs" / "index.md").write_text(INDEX.format(text="fixed"))
-    built(project)
 
 
 def test_what_is_generated_stands_at_its_mark(project: Path) -> None:
@@ -162,6 +145,7 @@ def test_every_mark_is_known() -> None:
             assert f'"{name}": ' in source
 
 
+@pytest.mark.usefixtures("no_sphinx")
 @pytest.mark.parametrize("there", [True, False])
 def test_the_site_is_replaced_in_one_step(
     project: Path, monkeypatch: pytest.MonkeyPatch, there: bool

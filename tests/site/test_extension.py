@@ -16,12 +16,9 @@ from replication.site.extension import formula, improve_tables
 
 def table(*rows: tuple[str, ...]) -> str:
     """Return a table in HTML; the first row is its head."""
-    head, *body = rows
-    cells = ["".join(f"<td>{cell}</td>" for cell in row) for row in body]
-    return (
-        f"<p>before</p><table><thead><tr>{''.join(f'<th>{c}</th>' for c in head)}</tr></thead>"
-        f"<tbody>{''.join(f'<tr>{row}</tr>' for row in cells)}</tbody></table>"
-    )
+    lines = ["".join(f"<td>{cell}</td>" for cell in row) for row in rows]
+    head, *body = (f"<tr>{line}</tr>" for line in lines)
+    return f"<table><thead>{head}</thead><tbody>{''.join(body)}</tbody></table>"
 
 
 def improved(*rows: tuple[str, ...]) -> Any:
@@ -52,7 +49,7 @@ def test_tables_sort_and_scroll_by_themselves() -> None:
     assert (box["role"], box["tabindex"]) == ("region", "0")
     assert box["aria-label"] == "Table 1: claim n"
     assert box.table["class"] == ["sortable"]
-    assert [cell["scope"] for cell in box.thead.find_all("th")] == ["col", "col"]
+    assert [cell["scope"] for cell in box.thead.find_all("td")] == ["col", "col"]
 
 
 def test_tables_can_be_downloaded() -> None:

@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import pytest
+
+from replication import Demos
+from replication.evidence.experiments import method_conditions
+from replication.evidence.specifications import Specification
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
+
+FEW = {"episodes": 100, "horizon": 40}
+
+Run = tuple[Results, dict[Specification, dict[tuple[str, str], Condition]]]
+
+
+@pytest.fixture(scope="session")
+def tiny(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Run two specifications, the second with a cap that most trials reach, and one method less."""
+    usual = method_conditions(small_demos, FEW)
+    capped = method_conditions(small_demos, {**FEW, "max_iterations": 5})
+    conditions = {
+        Specification("single", ()): {k: one for k, one in usual.items() if k[1] != "updated"},
+        Specification("single", (("ITERATION-CAP", 5),)): {
+            k: one for k, one in capped.items() if k[1] != "printed" and k[0] != "adaboost"
+        },
+    }
+    store = Store(tmp_path_factory.mktemp("sensitivity") / "trials.sqlite")
+    every = [*usual.values(), *capped.values()]
+    return run_trials(every, trials=6, store=store, seed=2), conditions
