@@ -1,4 +1,7 @@
-"""Pictures of the soccer field: at the start (Fig. 10), and the demonstrations (Fig. 11)."""
+"""Pictures of the soccer field: at the start (Fig. 10), and the demonstrations (Fig. 11).
+
+One file because it is one field, whose walls, paths and sizes are the same in both.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Pictures of mazes: demonstrations on the map, learned values as surfaces, and a fit.
 
-In their numbers, as on the page, x goes right and y goes up, in cells from the lower left.
+One file because in the numbers of all, as on the page, x goes right and y goes up, in cells from
+the lower left.
 """
 
 from __future__ import annotations
