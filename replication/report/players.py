@@ -1,6 +1,7 @@
 """Players of the agent while it learns: where it goes, its rewards, how far it is from the expert.
 
-Methods are shown side by side, with a frame for each iteration.
+Methods are shown side by side, with a frame for each iteration. One file because what a player
+shows of a trial (`Course`) and how that is drawn change together.
 """
 
 from __future__ import annotations

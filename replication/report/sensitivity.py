@@ -20,8 +20,6 @@ from replication.report.picture import Picture
 from replication.report.readable import F_LABELS
 from replication.report.style import canvas, legend_below, settled
 
-# --- one choice at a time ------------------------------------------------------------------------
-
 
 def single(effects: pd.DataFrame, claims: Sequence[str]) -> Picture:
     """Show the effects with one choice changed, a row for each value and a panel for each claim.
@@ -80,9 +78,6 @@ def draw_single(numbers: pd.DataFrame) -> Figure:
     handles.append(handle("default", "", "0.1", lw=1, ls=(0, (4, 2))))
     legend_below(figure, handles)
     return figure
-
-
-# --- which choices matter ------------------------------------------------------------------------
 
 
 def shares(table: pd.DataFrame) -> Picture:
@@ -148,9 +143,6 @@ def draw_shares(numbers: pd.DataFrame) -> Figure:
     axes[1].tick_params(labelleft=False)
     legend_below(figure, [Patch(color=colour, label=name) for name, colour in OUTCOMES.items()])
     return figure
-
-
-# --- the number of incorrect demonstrations ------------------------------------------------------
 
 
 def numbers(table: pd.DataFrame) -> Picture:
