@@ -427,7 +427,8 @@ def learn(
     result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
     saved = result.save(f"{stem}.json")
-    style.save_figure(maze.fit_figure(result), stem, formats=("png",))
+    figure = maze.fit_figure(demos, result.states, result.weights, result.errors)
+    style.save_figure(figure, stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     click.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "

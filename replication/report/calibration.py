@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from replication.evidence.calibration import CALIBRATED
 from replication.evidence.specifications import sort_key
-from replication.report.axes import handle
+from replication.report.drawing import handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, interval, readable
 from replication.report.style import canvas, legend_below, settled
@@ -19,10 +19,7 @@ from replication.report.style import canvas, legend_below, settled
 def grid(table: pd.DataFrame) -> Picture:
     """Show the SD against the mean of each point of the calibration grid.
 
-    Parameters
-    ----------
-    table
-        Of :func:`replication.evidence.calibration.calibration_table`.
+    `table` is a :func:`~replication.evidence.calibration.calibration_table`.
     """
     paper = table.iloc[0]
     words = (
@@ -76,9 +73,9 @@ def _label_in_free_corner(panel: Axes, numbers: pd.DataFrame, row: pd.Series) ->
         (values - values.min()) / (values.max() - values.min())
         for values in (numbers["mean"], numbers["sd"])
     )
-    corners = [(0, 1), (1, 1), (0, 0), (1, 0)]
     across, up = min(
-        corners, key=lambda at: int(((abs(x - at[0]) < 0.5) & (abs(y - at[1]) < 0.25)).sum())
+        ((0, 1), (1, 1), (0, 0), (1, 0)),
+        key=lambda at: int(((abs(x - at[0]) < 0.5) & (abs(y - at[1]) < 0.25)).sum()),
     )
     point = _point(row)
     panel.annotate(
@@ -102,9 +99,9 @@ def readable_check(check: pd.DataFrame) -> pd.DataFrame:
         {
             "Trials": lambda row: f"{row.n}, {sources[row.trials]}",
             "Reading": lambda row: F_LABELS[row.reading],
-            "Mean [95 %]": interval("mean", "low", "high"),
+            "Mean [95 %]": lambda row: interval(row.mean, row.low, row.high),
             "Expected": lambda row: f"{row.predicted_low:.2f} to {row.predicted_high:.2f}",
-            "SD [95 %]": interval("sd", "sd_low", "sd_high"),
+            "SD [95 %]": lambda row: interval(row.sd, row.sd_low, row.sd_high),
             "SD expected": lambda row: f"{row.sd_predicted_low:.2f} to {row.sd_predicted_high:.2f}",
         },
     )

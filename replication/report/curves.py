@@ -1,6 +1,7 @@
 """Pictures of many trials: errors (Figs. 5, 9, 12), iterations (Figs. 6, 9), what sets save.
 
-Each has a panel for each reading of Eq. 9; a method without a trace is shown in every panel.
+One file because all have a panel for each reading of Eq. 9, in which a method without a trace is
+shown as well, and the same lines and marks.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from replication.evidence.experiments import Key, under
-from replication.irl import METHODS, READINGS, get_method
+from replication.irl import METHODS, READINGS
 from replication.irl.methods import Method
 from replication.paper.published import Published
 from replication.report.picture import Picture
-from replication.report.readable import F_LABELS
+from replication.report.readable import F_LABELS, full_label
 from replication.report.style import canvas, legend_below, settled
 from replication.trials.compute import TRACED_TRIAL
 from replication.trials.condition import Condition
@@ -44,11 +45,6 @@ def _panels(numbers: pd.DataFrame) -> Panels:
     }
 
 
-def _name(method: str, reading: str) -> str:
-    label = get_method(method).label
-    return f"{label}, {F_LABELS[reading]}" if reading else label
-
-
 # --- errors ----------------------------------------------------------------------------------
 
 
@@ -61,16 +57,10 @@ def errors(
 ) -> Picture:
     """Show the error d against the iteration.
 
-    Parameters
-    ----------
-    results, conditions
-        What to show.
-    published
-        The iteration at which the paper's own curve is zero, by method.
-    median
-        Whether the trial that is drawn is the median one (FIG12-TRIAL), or trial 0 (FIG5-TRIAL).
+    `published` has the iteration at which the paper's own curve is zero, by method. The trial that
+    is drawn is trial 0 (FIG5-TRIAL), or the median one (FIG12-TRIAL).
     """
-    parts = []
+    parts, words = [], []
     for (method, reading), condition in conditions.items():
         every = results.errors(condition)
         trial = median_trial(results.iterations(condition)) if median else TRACED_TRIAL
@@ -87,8 +77,10 @@ def errors(
             "paper": published.get(method, np.nan),
         }
         parts.append(pd.DataFrame(columns))
+        after = f"half of the trials are at zero after {(middle > 0).sum()} iterations"
+        words.append(f"{full_label(method, reading)}: {after}")
     numbers = pd.concat(parts, ignore_index=True)
-    return Picture(numbers, draw_errors, _describe_errors(numbers))
+    return Picture(numbers, draw_errors, f"Error d against iteration. {'; '.join(words)}.")
 
 
 def median_trial(iterations: NDArray[np.int64]) -> int:
@@ -101,15 +93,6 @@ def median_trial(iterations: NDArray[np.int64]) -> int:
     """
     middle = np.sort(iterations)[(len(iterations) - 1) // 2]
     return int(np.flatnonzero(iterations == middle)[0])
-
-
-def _describe_errors(numbers: pd.DataFrame) -> str:
-    parts = [
-        f"{_name(method, reading)}: half of the trials are at zero after "
-        f"{(rows['median'] > 0).sum()} iterations"
-        for (reading, method), rows in numbers.groupby(["reading", "method"], sort=False)
-    ]
-    return f"Error d against iteration. {'; '.join(parts)}."
 
 
 @settled
@@ -174,15 +157,8 @@ def iterations(
     """Show the iterations of every trial, with their distribution.
 
     That Fig. 9 shows this, and not errors, is the choice FIG9-AXES.
-
-    Parameters
-    ----------
-    results, conditions
-        What to show.
-    published
-        The paper's numbers, by method.
     """
-    parts = []
+    parts, words = [], []
     for (method, reading), condition in conditions.items():
         counts = pd.Series(results.iterations(condition))
         columns = {
@@ -195,16 +171,9 @@ def iterations(
             "paper": published[method].mean if method in published else np.nan,
         }
         parts.append(pd.DataFrame(columns))
+        words.append(f"{full_label(method, reading)}: {counts.mean():.1f} on average")
     numbers = pd.concat(parts, ignore_index=True)
-    return Picture(numbers, draw_iterations, _describe_iterations(numbers))
-
-
-def _describe_iterations(numbers: pd.DataFrame) -> str:
-    parts = [
-        f"{_name(method, reading)}: {rows['mean'].iloc[0]:.1f} on average"
-        for (reading, method), rows in numbers.groupby(["reading", "method"], sort=False)
-    ]
-    return f"Iterations of each trial. {'; '.join(parts)}."
+    return Picture(numbers, draw_iterations, f"Iterations of each trial. {'; '.join(words)}.")
 
 
 @settled
@@ -214,9 +183,8 @@ def draw_iterations(numbers: pd.DataFrame) -> Figure:
     A dot marks our mean, an open triangle the paper's.
     """
     panels = _panels(numbers)
-    figure, grid = canvas(
-        len(panels), 2, height=0.7 + 2.0 * len(panels), width_ratios=(4, 1), sharey=True
-    )
+    height = 0.7 + 2.0 * len(panels)
+    figure, grid = canvas(len(panels), 2, height=height, width_ratios=(4, 1), sharey=True)
     grid = np.atleast_2d(grid)
     for (left, right), (title, shown) in zip(grid, panels.items(), strict=True):
         for position, (method, rows) in enumerate(shown):
@@ -239,14 +207,8 @@ def draw_iterations(numbers: pd.DataFrame) -> Figure:
 def _draw_distribution(panel: Axes, position: int, colour: str, rows: pd.DataFrame) -> None:
     bars = rows.drop_duplicates("iterations").sort_values("iterations")
     half = 0.42 * bars["trials_alike"].to_numpy() / bars["trials_alike"].max()
-    panel.barh(
-        bars["iterations"].to_numpy(),
-        2 * half,
-        left=position - half,
-        height=0.9,
-        color=colour,
-        alpha=0.35,
-    )
+    style: dict[str, Any] = {"height": 0.9, "color": colour, "alpha": 0.35}
+    panel.barh(bars["iterations"].to_numpy(), 2 * half, left=position - half, **style)
     panel.plot(position, rows["mean"].iloc[0], "o", color=colour, ms=5, zorder=4)
     paper = rows["paper"].iloc[0]
     if not np.isnan(paper):
@@ -262,7 +224,14 @@ def sets(table: pd.DataFrame) -> Picture:
     `table` is that of :func:`replication.evidence.tables.sets_table`, whose differences are
     negative where iterations are saved.
     """
-    return Picture(table, draw_sets, _describe_sets(table))
+    parts = [
+        f"{row.set}, {title}: {row.saved:.1f} ({row.least:.1f} to {row.most:.1f})"
+        for title, shown in _saved(table).items()
+        for _, rows in shown
+        for row in rows.itertuples()
+    ]
+    words = "Iterations saved by incorrect demonstrations, with 95 % intervals"
+    return Picture(table, draw_sets, f"{words}. {'; '.join(parts)}.")
 
 
 def _saved(table: pd.DataFrame) -> Panels:
@@ -273,16 +242,6 @@ def _saved(table: pd.DataFrame) -> Panels:
             most=lambda rows: 0 - rows["low"],
         )
     )
-
-
-def _describe_sets(table: pd.DataFrame) -> str:
-    parts = [
-        f"{row.set}, {title}: {row.saved:.1f} ({row.least:.1f} to {row.most:.1f})"
-        for title, shown in _saved(table).items()
-        for _, rows in shown
-        for row in rows.itertuples()
-    ]
-    return f"Iterations saved by incorrect demonstrations, with 95 % intervals. {'; '.join(parts)}."
 
 
 @settled

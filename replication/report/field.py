@@ -1,13 +1,12 @@
 """Pictures of the soccer field: at the start (Fig. 10), and the demonstrations (Fig. 11).
 
-Axes are in metres and to scale. Walls, gate, paths and sizes are the same in every field
-(:mod:`replication.envs.soccer.rules`); all else is in the numbers.
+One file because it is one field, whose walls, paths and sizes are the same in both.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
-from numpy.typing import ArrayLike, NDArray
 
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
@@ -24,6 +22,7 @@ from replication.envs.soccer import rules
 from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.field import SoccerField, as_soccer
 from replication.envs.soccer.replay import ray_tips, replay
+from replication.report import pitch
 from replication.report.picture import Picture
 from replication.report.style import (
     CORRECT_COLOUR,
@@ -34,15 +33,9 @@ from replication.report.style import (
     settled,
 )
 
-Floats = NDArray[np.float64]
+COLOURS = KIND_COLOURS | {"overspeed": pitch.ORANGE, "opposite": OTHER_KIND_COLOUR}
+SPARE_COLOURS = (pitch.VERMILION, pitch.BLUE, "#000000", pitch.YELLOW)
 
-# Okabe and Ito's colours where the mazes have none; the paper's correct demonstration is pink.
-PINK, ORANGE, BLUE, YELLOW, VERMILION = "#CC79A7", "#E69F00", "#0072B2", "#F0E442", "#D55E00"
-COLOURS = KIND_COLOURS | {"overspeed": ORANGE, "opposite": OTHER_KIND_COLOUR}
-SPARE_COLOURS = (VERMILION, BLUE, "#000000", YELLOW)
-PATH_COLOUR, WALL_COLOUR, GATE_COLOUR = "#6C8EBF", "0.45", "#D9EAD3"
-
-GATE_DEPTH = 0.06  # of the drawing only: in metres
 BESIDE = 0.02  # metres between ways that would hide each other
 BROAD, NARROW = 2.3, 1.1  # where kinds share a way, the later is drawn upon the broader earlier one
 SLOW: dict[str, Any] = {"marker": "D", "ms": 4.5, "mfc": "white", "mew": 1.2}
@@ -85,29 +78,28 @@ def _describe_start(field: SoccerField) -> str:
 def draw_start(numbers: pd.DataFrame) -> Figure:
     """Draw the field with its grid, and all that stands on it with labels."""
     figure, (panel,) = canvas(1, 1, height=5.95)
-    draw_pitch(panel, small=False)
+    pitch.draw_pitch(panel, small=False)
     _draw_grid(panel)
     things = dict(iter(numbers.groupby("what")))
     pose = things["robot"][["x", "y", "heading"]].to_numpy()[0]
     ball, *_ = things["ball"][["x", "y"]].to_numpy()
     rays, obstacles = (things[name][["x", "y"]].to_numpy() for name in ("ray", "obstacle"))
     for tip in rays:
-        panel.plot(*zip(pose[:2], tip, strict=True), color=VERMILION, lw=0.7, zorder=3)
-    Movers(panel).place(pose, ball, obstacles)
+        panel.plot(*zip(pose[:2], tip, strict=True), color=pitch.VERMILION, lw=0.7, zorder=3)
+    pitch.Movers(panel).place(pose, ball, obstacles)
     reach = things["ray"]["length"].iloc[0]
     x, y, _ = pose
     _label(panel, "controlled robot", (x, y - reach - 0.012), va="top")
     text = f"{len(rays)} infrared rays,\n{reach:g} m long"
-    _label(panel, text, (x, y + reach + 0.012), va="bottom", color=VERMILION)
+    _label(panel, text, (x, y + reach + 0.012), va="bottom", color=pitch.VERMILION)
     _label(panel, "ball", (ball[0], ball[1] + 0.035), va="bottom")
     _label(panel, "gate", (rules.WIDTH - 0.012, np.mean(rules.GATE)), ha="right", va="center")
-    for number, (path, place) in enumerate(zip(rules.PATHS, obstacles, strict=True), 1):
-        upright = path.start[0] == path.end[0]
+    for number, (path, (x, y)) in enumerate(zip(rules.PATHS, obstacles, strict=True), 1):
         text = f"obstacle {number}\n{path.speed:.2f} m/s"
-        if upright:
-            _label(panel, text, (place[0] + 0.05, place[1]), ha="left", va="center")
+        if path.start[0] == path.end[0]:
+            _label(panel, text, (x + 0.05, y), ha="left", va="center")
         else:
-            _label(panel, text, (place[0], place[1] - 0.05), va="top")
+            _label(panel, text, (x, y - 0.05), va="top")
     panel.set(xlabel="x (m)", ylabel="y (m)")
     return figure
 
@@ -115,14 +107,12 @@ def draw_start(numbers: pd.DataFrame) -> Figure:
 def _draw_grid(panel: Axes) -> None:
     """Draw the borders between the cells of the state space."""
     style: dict[str, Any] = {"color": "0.9", "lw": 0.5, "zorder": 0.15}
-    floor = Polygon(_outline(), transform=panel.transData)
-    for column in range(1, rules.COLUMNS):
-        x = column * rules.WIDTH / rules.COLUMNS
-        (line,) = panel.plot([x, x], [0, rules.HEIGHT], **style)
-        line.set_clip_path(floor)
-    for row in range(1, rules.ROWS):
-        y = row * rules.HEIGHT / rules.ROWS
-        (line,) = panel.plot([0, rules.WIDTH], [y, y], **style)
+    x = np.arange(1, rules.COLUMNS) * rules.WIDTH / rules.COLUMNS
+    y = np.arange(1, rules.ROWS) * rules.HEIGHT / rules.ROWS
+    lines = panel.plot([x, x], np.array([[0], [rules.HEIGHT]]), **style)
+    lines += panel.plot(np.array([[0], [rules.WIDTH]]), [y, y], **style)
+    floor = Polygon(pitch.outline(), transform=panel.transData)
+    for line in lines:
         line.set_clip_path(floor)
 
 
@@ -137,46 +127,12 @@ def _label(panel: Axes, text: str, place: tuple[float, Any], **style: Any) -> No
 def demonstrations(demos: Demos) -> Picture:
     """Show the correct demonstrations, and the incorrect ones in the same field."""
     field = as_soccer(demos.environment)
-    tables = []
-    for demo in demos.correct + demos.incorrect:
-        table = episode_numbers(field, demo.actions)
-        table.insert(0, "kind", demo.kind)
-        table.insert(1, "demo", demo.name)
-        tables.append(table)
-    numbers = pd.concat(tables, ignore_index=True)
-    return Picture(numbers, draw_demonstrations, _describe_demonstrations(numbers))
-
-
-def episode_numbers(field: SoccerField, actions: Iterable[int]) -> pd.DataFrame:
-    """Return an episode as rows, one for each border between two decisions.
-
-    `action` is the decision that follows, `touched` whether the robot touched something in the one
-    before; `outcome` is why the episode is over, or "open".
-    """
-    episode = replay(field, actions)
-    columns = {
-        "decision": np.arange(len(episode.times)),
-        "time": episode.times,
-        "x": episode.poses[:, 0],
-        "y": episode.poses[:, 1],
-        "heading": episode.poses[:, 2],
-        "ball_x": episode.balls[:, 0],
-        "ball_y": episode.balls[:, 1],
-        "detected": episode.detected,
-        "action": [*(rules.ACTIONS[action] for action in episode.actions), ""],
-        "touched": [False, *episode.touched],
-        "outcome": episode.outcome,
+    tables = {
+        (demo.kind, demo.name): replay(field, demo.actions)
+        for demo in demos.correct + demos.incorrect
     }
-    for number in range(episode.obstacles.shape[1]):
-        columns[f"obstacle_{number + 1}_x"] = episode.obstacles[:, number, 0]
-        columns[f"obstacle_{number + 1}_y"] = episode.obstacles[:, number, 1]
-        columns[f"obstacle_{number + 1}_seen"] = episode.seen[:, number]
-    return pd.DataFrame(columns)
-
-
-def obstacle_columns(*axes: str) -> list[list[str]]:
-    """Return the names of each obstacle's columns."""
-    return [[f"obstacle_{n}_{axis}" for axis in axes] for n in range(1, len(rules.PATHS) + 1)]
+    numbers = pd.concat(tables, names=["kind", "demo", None]).reset_index(["kind", "demo"])
+    return Picture(numbers, draw_demonstrations, _describe_demonstrations(numbers))
 
 
 def _describe_demonstrations(numbers: pd.DataFrame) -> str:
@@ -184,14 +140,11 @@ def _describe_demonstrations(numbers: pd.DataFrame) -> str:
     first = correct[0]
     seen = [str(decision) for decision in first["decision"][first["detected"]]]
     listed = " and ".join(filter(None, [", ".join(seen[:-1]), *seen[-1:]]))
-    detected = (
-        f"it detects a moving robot after {listed} decisions"
-        if seen
-        else "it never detects a moving robot"
-    )
+    detects = f"detects a moving robot after {listed} decisions"
     text = (
         f"Ways of the robot on the soccer field. The correct demonstration takes "
-        f"{len(first) - 1} decisions and {first['time'].iloc[-1]:.1f} s to the goal; {detected} "
+        f"{len(first) - 1} decisions and {first['time'].iloc[-1]:.1f} s to the goal; it "
+        f"{detects if seen else 'never detects a moving robot'} "
         f"and drives slowly in {_is_slow(first).sum()} decisions."
     )
     if not incorrect:
@@ -209,8 +162,8 @@ def _split(numbers: pd.DataFrame) -> tuple[list[pd.DataFrame], dict[str, list[pd
     return by_kind.pop("correct"), by_kind
 
 
-def _is_slow(demo: pd.DataFrame) -> NDArray[np.bool_]:
-    return (demo["action"] == rules.ACTIONS[rules.SLOW]).to_numpy()
+def _is_slow(demo: pd.DataFrame) -> pd.Series:
+    return demo["action"] == rules.ACTIONS[rules.SLOW]
 
 
 def _ends_in_contact(demo: pd.DataFrame) -> bool:
@@ -228,20 +181,20 @@ def draw_demonstrations(numbers: pd.DataFrame) -> Figure:
     correct, incorrect = _split(numbers)
     figure, axes = canvas(1, 2, height=4.05, sharex=True, sharey=True)
     for panel, title in zip(axes, ("(a) correct", "(b) incorrect"), strict=True):
-        draw_pitch(panel)
+        pitch.draw_pitch(panel)
         panel.set(title=title, xlabel="x (m)")
     axes[0].set_ylabel("y (m)")
     axes[1].tick_params(left=False)
     for demo in correct:
         _draw_correct(axes[0], demo)
-        axes[1].plot(*_way(demo).T, color=PINK, lw=1.0, zorder=3)
+        axes[1].plot(*_way(demo).T, color=pitch.PINK, lw=1.0, zorder=3)
+    ring: dict[str, Any] = {"marker": "o", "ms": 10, "mfc": "none", "mec": CORRECT_COLOUR}
+    cross: dict[str, Any] = {"marker": "x", "ms": 5, "mew": 1.5, "color": "0.3"}
     handles = [
-        Line2D([], [], color=PINK, marker="o", ms=3.5, label=f"correct ({len(correct)})"),
-        Line2D([], [], color=PINK, label="drives slowly", **SLOW),
-        Line2D(
-            [], [], lw=0, marker="o", ms=10, mfc="none", mec=CORRECT_COLOUR, label="detected robot"
-        ),
-        Line2D([], [], lw=0, marker="x", ms=5, mew=1.5, color="0.3", label="ends with a contact"),
+        Line2D([], [], color=pitch.PINK, marker="o", ms=3.5, label=f"correct ({len(correct)})"),
+        Line2D([], [], color=pitch.PINK, label="drives slowly", **SLOW),
+        Line2D([], [], lw=0, label="detected robot", **ring),
+        Line2D([], [], lw=0, label="ends with a contact", **cross),
     ]
     beside = (side * rank for rank in itertools.count(1) for side in (1, -1))
     spare = itertools.cycle(SPARE_COLOURS)
@@ -253,26 +206,26 @@ def draw_demonstrations(numbers: pd.DataFrame) -> Figure:
         handles.append(Line2D([], [], label=f"{kind} ({len(demos)})", **line))
     first = correct[0].iloc[0]
     for panel in axes:
-        Movers(panel, obstacles=False).place(
-            first[["x", "y", "heading"]], first[["ball_x", "ball_y"]]
-        )
+        movers = pitch.Movers(panel, obstacles=False)
+        movers.place(first[["x", "y", "heading"]], first[["ball_x", "ball_y"]])
     legend_below(figure, handles)
     return figure
 
 
-def _way(demo: pd.DataFrame) -> Floats:
+def _way(demo: pd.DataFrame) -> pitch.Floats:
     return demo[["x", "y"]].to_numpy()
 
 
 def _draw_correct(panel: Axes, demo: pd.DataFrame) -> None:
-    x, y = _way(demo).T
-    slow = np.flatnonzero(_is_slow(demo))
-    panel.plot(x, y, color=PINK, marker="o", ms=2.8, zorder=5)
-    panel.plot(x[slow], y[slow], color=PINK, lw=0, zorder=6, **SLOW)
-    for *place, seen in obstacle_columns("x", "y", "seen"):
-        places = demo.loc[demo[seen], place].to_numpy()
-        for centre, alpha in zip(places, np.linspace(0.35, 0.9, len(places)), strict=True):
-            _draw_obstacle(panel, centre, alpha)
+    panel.plot(*_way(demo).T, color=pitch.PINK, marker="o", ms=2.8, zorder=5)
+    panel.plot(*_way(demo[_is_slow(demo)]).T, color=pitch.PINK, lw=0, zorder=6, **SLOW)
+    for *names, seen in pitch.obstacle_columns("x", "y", "seen"):
+        places = demo.loc[demo[seen], names].to_numpy()
+        for (x, y), alpha in zip(places, np.linspace(0.35, 0.9, len(places)), strict=True):
+            style: dict[str, Any] = {"alpha": alpha, "zorder": 4}
+            body, stripe = (pitch.placed((x, y, 0.0), each) for each in (pitch.BODY, pitch.STRIPE))
+            panel.add_patch(Polygon(body, fc=pitch.YELLOW, **pitch.EDGE, **style))
+            panel.add_patch(Polygon(stripe, fc=CORRECT_COLOUR, lw=0, **style))
         if len(places):
             centre = (places.min(axis=0) + places.max(axis=0)) / 2
             radius = np.abs(places - centre).max() + 0.8 * rules.ROBOT_SIDE
@@ -280,7 +233,11 @@ def _draw_correct(panel: Axes, demo: pd.DataFrame) -> None:
 
 
 def _draw_incorrect(
-    panel: Axes, demo: pd.DataFrame, right: Floats, line: Mapping[str, Any], beside: Iterator[int]
+    panel: Axes,
+    demo: pd.DataFrame,
+    right: pitch.Floats,
+    line: Mapping[str, Any],
+    beside: Iterator[int],
 ) -> None:
     way = _way(demo)
     shared = min(len(way), len(right))
@@ -299,107 +256,9 @@ def _draw_incorrect(
         panel.annotate("", branch[-1], branch[-2], arrowprops=style, zorder=6)
 
 
-def _distance(place: Floats, way: Floats) -> float:
+def _distance(place: pitch.Floats, way: pitch.Floats) -> float:
     """Return how far a place is from a polyline."""
     start, step = way[:-1], np.diff(way, axis=0)
     square = np.maximum((step**2).sum(axis=1), 1e-12)
     part = np.clip(((place - start) * step).sum(axis=1) / square, 0, 1)[:, None]
     return float(np.linalg.norm(start + part * step - place, axis=1).min())
-
-
-# --- pieces ----------------------------------------------------------------------------------
-
-
-def draw_pitch(panel: Axes, *, small: bool = True) -> None:
-    """Draw walls, gate and the obstacles' paths, and set up the axes."""
-    width, head, gap, layer = (0.6, 6, 0.4, 1.0) if small else (1.0, 10, 0.2, 4.5)
-    thick = 2 * rules.WALL_RADIUS
-    low, high = rules.GATE
-    gate = [(rules.WIDTH, low), (rules.WIDTH + GATE_DEPTH, low)]
-    gate += [(rules.WIDTH + GATE_DEPTH, high), (rules.WIDTH, high)]
-    panel.add_patch(Polygon(_outline(thick), fc=WALL_COLOUR, lw=0, zorder=0))
-    panel.add_patch(Polygon(_outline(), fc="white", lw=0, zorder=0.1))
-    panel.add_patch(Polygon(gate, fc=GATE_COLOUR, ec="#2E7D32", lw=0.8, hatch="xxxx", zorder=0.2))
-    for path in rules.PATHS:
-        arrow = {"arrowstyle": "<|-|>", "ls": "--", "color": PATH_COLOUR, "lw": width}
-        arrow |= {"shrinkA": 0, "shrinkB": 0, "mutation_scale": head}
-        panel.annotate("", path.end, path.start, arrowprops=arrow, zorder=layer)
-    margin = thick + 0.01
-    panel.set(
-        xlim=(-margin, rules.WIDTH + GATE_DEPTH + 0.01),
-        ylim=(-margin, rules.HEIGHT + margin),
-        aspect="equal",
-        anchor="N",  # else the layout, which knows nothing of the aspect, may cut a title
-        xticks=np.arange(0, rules.WIDTH + 0.01, gap),
-        yticks=np.arange(0, rules.HEIGHT + 0.01, gap),
-    )
-    panel.spines[:].set_visible(False)
-    panel.tick_params(length=2)
-
-
-def _outline(grow: float = 0.0) -> Floats:
-    """Return the corners of the field, or of what is further out by `grow`."""
-    cut = rules.CORNER + grow * (2 - np.sqrt(2))
-    low, right, top = -grow, rules.WIDTH + grow, rules.HEIGHT + grow
-    return np.array(
-        [
-            (low, low + cut),
-            (low + cut, low),
-            (right - cut, low),
-            (right, low + cut),
-            (right, top - cut),
-            (right - cut, top),
-            (low + cut, top),
-            (low, top - cut),
-        ]
-    )
-
-
-_BODY = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
-_NOSE = ((0.5, 0.0), (-0.35, -0.27), (-0.35, 0.27))  # a triangle that points ahead
-_STRIPE = ((-0.5, -0.16), (0.5, -0.16), (0.5, 0.16), (-0.5, 0.16))
-
-
-def _placed(pose: Iterable[float], shape: ArrayLike) -> Floats:
-    """Turn and move a shape, given in sides of a robot, to a pose."""
-    x, y, heading = pose
-    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
-    return np.asarray(shape) * rules.ROBOT_SIDE @ turn + (x, y)
-
-
-def _draw_obstacle(panel: Axes, place: Floats, alpha: float) -> None:
-    pose = (*place, 0.0)
-    style: dict[str, Any] = {"alpha": alpha, "zorder": 4}
-    panel.add_patch(Polygon(_placed(pose, _BODY), fc=YELLOW, ec="0.2", lw=0.6, **style))
-    panel.add_patch(Polygon(_placed(pose, _STRIPE), fc=CORRECT_COLOUR, lw=0, **style))
-
-
-class Movers:
-    """All that moves, in one panel."""
-
-    def __init__(self, panel: Axes, *, obstacles: bool = True) -> None:
-        def patch(colour: str, **style: Any) -> Polygon:
-            shape = Polygon(((0, 0),), fc=colour, **{"zorder": 4, "lw": 0} | style)
-            panel.add_patch(shape)
-            return shape
-
-        edge: dict[str, Any] = {"ec": "0.2", "lw": 0.6}
-        n_obstacles = len(rules.PATHS) if obstacles else 0
-        self.obstacles = [
-            (patch(YELLOW, **edge), patch(CORRECT_COLOUR)) for _ in range(n_obstacles)
-        ]
-        self.robot = patch(BLUE, **edge, zorder=5), patch(CORRECT_COLOUR, zorder=5)
-        self.ball = Circle((0, 0), rules.BALL_RADIUS, fc="white", ec="black", lw=0.9, zorder=5)
-        panel.add_patch(self.ball)
-
-    def place(
-        self, pose: Iterable[float], ball: Iterable[float], obstacles: Sequence[Floats] = ()
-    ) -> None:
-        """Put everything in its place."""
-        for patch, shape in zip(self.robot, (_BODY, _NOSE), strict=True):
-            patch.set_xy(_placed(pose, shape))
-        x, y = ball
-        self.ball.set_center((float(x), float(y)))
-        for patches, (x, y) in zip(self.obstacles, obstacles, strict=False):
-            for patch, shape in zip(patches, (_BODY, _STRIPE), strict=True):
-                patch.set_xy(_placed((x, y, 0.0), shape))

@@ -17,18 +17,11 @@ from matplotlib.lines import Line2D
 
 from replication.envs.environment import Environment
 from replication.envs.soccer.field import as_soccer
+from replication.envs.soccer.replay import replay
 from replication.files import write_file
 from replication.irl import Trial
-from replication.report.field import (
-    BLUE,
-    PINK,
-    YELLOW,
-    Movers,
-    draw_pitch,
-    episode_numbers,
-    obstacle_columns,
-)
-from replication.report.players import Player, player
+from replication.report.moving import Player, player
+from replication.report.pitch import BLUE, PINK, YELLOW, Movers, draw_pitch, obstacle_columns
 from replication.report.style import WIDTH, legend_below, style
 
 FRAMES_A_SECOND, LAST_FRAMES, DPI = 5, 5, 90
@@ -65,20 +58,12 @@ def turning_points(trial: Trial) -> dict[str, Iterable[int]]:
 def film(
     environment: Environment, episodes: Mapping[str, Iterable[int]], *, decisions: int = 40
 ) -> Film:
-    """Show episodes side by side, a frame for each decision.
+    """Show episodes, actions by title, side by side, with a frame for each of so many decisions.
 
-    Parameters
-    ----------
-    environment
-        The field in which they take place.
-    episodes
-        Actions by title.
-    decisions
-        How many of them are shown of each episode, at most. An episode that is over keeps its last
-        frame, and so does the whole for a second.
+    An episode that is over keeps its last frame, and so does the whole for a second.
     """
     field = as_soccer(environment)
-    tables = {title: episode_numbers(field, actions) for title, actions in episodes.items()}
+    tables = {title: replay(field, actions) for title, actions in episodes.items()}
     ends = {title: _end(table, decisions) for title, table in tables.items()}
     with style():
         size = min(WIDTH / len(tables), 4.0)
@@ -106,34 +91,29 @@ def film(
             return []
 
         draw(0)
-        legend_below(
-            figure,
-            [
-                Line2D([], [], color=BLUE, marker="s", ms=6, lw=0, label="controlled robot"),
-                Line2D([], [], color=PINK, marker="o", ms=2, label="its way, a dot a decision"),
-                Line2D([], [], color=YELLOW, marker="s", ms=6, mec="0.2", lw=0, label="obstacle"),
-                Line2D([], [], color="white", marker="o", ms=5, mec="black", lw=0, label="ball"),
-            ],
-        )
+        handles = [
+            Line2D([], [], color=BLUE, marker="s", ms=6, lw=0, label="controlled robot"),
+            Line2D([], [], color=PINK, marker="o", ms=2, label="its way, a dot a decision"),
+            Line2D([], [], color=YELLOW, marker="s", ms=6, mec="0.2", lw=0, label="obstacle"),
+            Line2D([], [], color="white", marker="o", ms=5, mec="black", lw=0, label="ball"),
+        ]
+        legend_below(figure, handles)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
         longest = min(max(map(len, tables.values())) - 1, decisions)
+        frames = [*range(longest), *[longest] * LAST_FRAMES]
+        pause = 1000 // FRAMES_A_SECOND
         animation = FuncAnimation(
-            figure,
-            draw,
-            frames=[*range(longest), *[longest] * LAST_FRAMES],
-            interval=1000 // FRAMES_A_SECOND,
-            cache_frame_data=False,
+            figure, draw, frames=frames, interval=pause, cache_frame_data=False
         )
     numbers = pd.concat(tables, names=["episode", None]).reset_index("episode")
-    words = "The robot's way in some episodes, moving. " + "; ".join(
-        f"{title}: {end}" for title, end in ends.items()
-    )
+    words = "; ".join(f"{title}: {end}" for title, end in ends.items())
+    words = f"The robot's way in some episodes, moving. {words}"
     return Film(figure, animation, numbers, words)
 
 
 def _end(table: pd.DataFrame, decisions: int) -> str:
-    """Return how an episode ends, of which at most so many decisions are shown."""
+    """Return how an episode ends, if at most so many decisions of it are shown."""
     taken, last = len(table) - 1, table.iloc[-1]
     if taken > decisions:
         return f"cut after {decisions} decisions"

@@ -1,11 +1,12 @@
 """Pictures of mazes: demonstrations on the map, learned values as surfaces, and a fit.
 
-In their numbers, as on the page, x goes right and y goes up, in cells from the lower left.
+One file because in the numbers of all, as on the page, x goes right and y goes up, in cells from
+the lower left.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -25,12 +26,8 @@ from replication.irl import Trial
 from replication.report.picture import Picture
 from replication.report.style import (
     CORRECT_COLOUR,
-    GOAL_COLOUR,
     KIND_COLOURS,
-    LEARNED_COLOUR,
-    OBSTACLE_COLOUR,
     OTHER_KIND_COLOUR,
-    START_COLOUR,
     WIDTH,
     canvas,
     legend_below,
@@ -38,9 +35,7 @@ from replication.report.style import (
 )
 from replication.trials.measures import Report
 
-if TYPE_CHECKING:
-    from replication.fit import Fit
-
+LEARNED_COLOUR = "#0072B2"
 TITLES = {
     "q_mid": "(a) Q after {} iterations",
     "q_end": "(b) Q at the end ({})",
@@ -58,7 +53,12 @@ def demonstrations(demos: Demos) -> Picture:
     for part in ("correct", "incorrect"):
         parts += [_demo_numbers(maze, demo).assign(part=part) for demo in getattr(demos, part)]
     numbers = pd.concat(parts, ignore_index=True)[["part", "kind", "demo", "step", "x", "y"]]
-    return Picture(numbers, draw_demonstrations, _describe_demonstrations(demos))
+    words = f"Map of {demos.task} with a correct demonstration of "
+    words += f"{len(demos.correct[0].actions)} moves"
+    counts = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
+    if counts:
+        words += f"; incorrect ones: {', '.join(counts)}"
+    return Picture(numbers, draw_demonstrations, f"{words}.")
 
 
 def map_numbers(maze: Maze) -> pd.DataFrame:
@@ -80,13 +80,6 @@ def _demo_numbers(maze: Maze, demo: Demo) -> pd.DataFrame:
     x, y = places(maze, demo.states)
     steps = np.arange(len(demo.states))
     return pd.DataFrame({"kind": demo.kind, "demo": demo.name, "step": steps, "x": x, "y": y})
-
-
-def _describe_demonstrations(demos: Demos) -> str:
-    moves = len(demos.correct[0].actions)
-    counts = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
-    incorrect = f"; incorrect ones: {', '.join(counts)}" if counts else ""
-    return f"Map of {demos.task} with a correct demonstration of {moves} moves{incorrect}."
 
 
 @settled
@@ -121,8 +114,8 @@ def draw_map(panel: Axes, numbers: pd.DataFrame, *, grid: bool = True) -> None:
     cells = {kind: rows[["x", "y"]].to_numpy() for kind, rows in numbers.groupby("kind")}
     n_columns, n_rows = cells["corner"][0] + 1
     for left, bottom in cells.get("obstacle", ()):
-        panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=OBSTACLE_COLOUR, lw=0))
-    for kind, colour, side in (("start", START_COLOUR, -1), ("goal", GOAL_COLOUR, 1)):
+        panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color="#8C8C8C", lw=0))
+    for kind, colour, side in (("start", "#E24A33", -1), ("goal", "#2CA02C", 1)):
         left, bottom = cells[kind][0]
         panel.add_patch(Rectangle((left - 0.5, bottom - 0.5), 1, 1, color=colour, alpha=0.55, lw=0))
         # Paths run through the middles of cells: at a corner, inside the map, none covers it.
@@ -131,10 +124,10 @@ def draw_map(panel: Axes, numbers: pd.DataFrame, *, grid: bool = True) -> None:
         corner = (left + across / 2, bottom + upwards / 2)
         letter = kind[0].upper()
         panel.text(*corner, letter, size=7.5, ha="center", va="center_baseline", zorder=6)
-    for line in range(n_columns + 1 if grid else 0):
-        panel.axvline(line - 0.5, color="0.9", lw=0.4, zorder=0)
-    for line in range(n_rows + 1 if grid else 0):
-        panel.axhline(line - 0.5, color="0.9", lw=0.4, zorder=0)
+    if grid:
+        for draw, count in ((panel.axvline, n_columns), (panel.axhline, n_rows)):
+            for line in range(count + 1):
+                draw(line - 0.5, color="0.9", lw=0.4, zorder=0)
     panel.set(xlim=(-0.5, n_columns - 0.5), ylim=(-0.5, n_rows - 0.5), aspect="equal")
     panel.set(xticks=range(0, n_columns, 5), yticks=range(0, n_rows, 5))
     panel.set(xlabel="x (cells)", ylabel="y (cells)")
@@ -144,11 +137,10 @@ def draw_map(panel: Axes, numbers: pd.DataFrame, *, grid: bool = True) -> None:
 
 def _draw_arrows(panel: Axes, demo: pd.DataFrame) -> None:
     x, y = demo["x"].to_numpy(), demo["y"].to_numpy()
-    arrows: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.007}
-    heads: dict[str, Any] = {"headwidth": 4.5, "headlength": 5, "headaxislength": 4.5}
-    panel.quiver(
-        x[:-1], y[:-1], np.diff(x), np.diff(y), color=CORRECT_COLOUR, zorder=5, **arrows, **heads
-    )
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.007}
+    style |= {"headwidth": 4.5, "headlength": 5, "headaxislength": 4.5}
+    style |= {"color": CORRECT_COLOUR, "zorder": 5}
+    panel.quiver(x[:-1], y[:-1], np.diff(x), np.diff(y), **style)
 
 
 def _draw_departure(
@@ -174,14 +166,8 @@ def _draw_departure(
 def surfaces(trial: Trial, environment: Environment, report: Report) -> Picture:
     """Show Q in the mid-term, Q at the end and the reward at the end, as surfaces over the maze.
 
-    Parameters
-    ----------
-    trial
-        A trial with snapshots.
-    environment
-        The maze; obstacles are left out.
-    report
-        What stands for a state's actions (FIG7-SURFACE), and when mid-term is (FIG7-MIDTERM).
+    The trial needs its snapshots. `report` says what stands for a state's actions (FIG7-SURFACE),
+    and when mid-term is (FIG7-MIDTERM). Obstacles are left out.
     """
     assert trial.snapshots is not None, "surfaces need a trial that kept its snapshots"
     maze = as_maze(environment)
@@ -199,15 +185,11 @@ def surfaces(trial: Trial, environment: Environment, report: Report) -> Picture:
         columns = {"surface": surface, "iteration": iteration, "x": x, "y": y, "value": value}
         parts.append(pd.DataFrame(columns))
     numbers = pd.concat(parts, ignore_index=True)
-    return Picture(numbers, draw_surfaces, _describe_surfaces(numbers))
-
-
-def _describe_surfaces(numbers: pd.DataFrame) -> str:
-    parts = [
+    words = [
         f"{title}: {rows['value'].min():.3g} to {rows['value'].max():.3g}"
         for title, rows in _surfaces(numbers)
     ]
-    return f"Surfaces over the maze. {'; '.join(parts)}."
+    return Picture(numbers, draw_surfaces, f"Surfaces over the maze. {'; '.join(words)}.")
 
 
 def _surfaces(numbers: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
@@ -225,24 +207,14 @@ def draw_surfaces(numbers: pd.DataFrame) -> Figure:
     FigureCanvasAgg(figure)
     shown = _surfaces(numbers)
     share = 1 / len(shown)
+    facets: dict[str, Any] = {"rstride": 1, "cstride": 1, "lw": 0.1, "ec": "0.35", "shade": False}
     for position, (title, rows) in enumerate(shown):
         grid = rows.pivot(index="y", columns="x", values="value").sort_index(ascending=False)
         x, y = np.meshgrid(grid.columns, grid.index)
         height = grid.to_numpy(float)
-        panel: Any = figure.add_axes(
-            (position * share + 0.015, 0.04, share - 0.03, 0.88), projection="3d"
-        )
-        panel.plot_surface(
-            x,
-            y,
-            height,
-            rstride=1,
-            cstride=1,
-            lw=0.1,
-            ec="0.35",
-            facecolors=_face_colours(height),
-            shade=False,
-        )
+        box = (position * share + 0.015, 0.04, share - 0.03, 0.88)
+        panel: Any = figure.add_axes(box, projection="3d")
+        panel.plot_surface(x, y, height, facecolors=_face_colours(height), **facets)
         panel.set_title(title, y=0.99)
         panel.set_xlabel("x (cells)", labelpad=-8)
         panel.set_ylabel("y (cells)", labelpad=-8)
@@ -268,24 +240,31 @@ def _face_colours(height: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @settled
-def fit_figure(fit: Fit) -> Figure:
-    """Draw a fit: the map with demonstrations and the learned path, the reward, and the errors."""
-    maze = as_maze(fit.demos.environment)
+def fit_figure(
+    demos: Demos,
+    states: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    errors: NDArray[np.float64],
+) -> Figure:
+    """Draw what was learned: the map with demonstrations and path, the reward, and the errors.
+
+    `states` is the learned path, `weights` are `[state, action]`, `errors` is d by iteration.
+    """
+    maze = as_maze(demos.environment)
     figure, axes = canvas(1, 3, height=3.0)
     draw_map(axes[0], map_numbers(maze))
-    for demo in fit.demos.correct:
+    for demo in demos.correct:
         _draw_arrows(axes[0], _demo_numbers(maze, demo))
-    x, y = places(maze, fit.states)
-    axes[0].plot(x, y, color=LEARNED_COLOUR, lw=4, alpha=0.45, solid_capstyle="round")
+    path: dict[str, Any] = {"color": LEARNED_COLOUR, "lw": 4, "alpha": 0.45}
+    axes[0].plot(*places(maze, states), solid_capstyle="round", **path)
     axes[0].set_title("learned path")
-    value = np.where(maze.free, fit.weights.max(axis=1), np.nan).reshape(maze.shape)
+    value = np.where(maze.free, weights.max(axis=1), np.nan).reshape(maze.shape)
     image = axes[1].imshow(value[::-1], cmap="viridis", origin="lower")
     axes[1].set(title="largest reward weight", xticks=[], yticks=[])
     figure.colorbar(image, ax=axes[1], fraction=0.046)
-    axes[2].plot(fit.errors, color=LEARNED_COLOUR)
+    axes[2].plot(errors, color=LEARNED_COLOUR)
     axes[2].set(title="error d", xlabel="iteration", xlim=(0, None), ylim=(0, None))
     axes[2].set_box_aspect(1)
     demo_handle = Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct demo")
-    path_handle = Line2D([], [], color=LEARNED_COLOUR, lw=4, alpha=0.45, label="learned path")
-    legend_below(figure, [demo_handle, path_handle])
+    legend_below(figure, [demo_handle, Line2D([], [], label="learned path", **path)])
     return figure

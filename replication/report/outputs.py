@@ -14,8 +14,8 @@ import pandas as pd
 
 from replication.evidence.tables import read_table, write_csv
 from replication.files import write_file
+from replication.report.moving import Player
 from replication.report.picture import Picture
-from replication.report.players import Player
 from replication.report.readable import markdown
 from replication.report.style import save_figure
 

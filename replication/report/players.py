@@ -1,21 +1,15 @@
-"""Moving figures with buttons and a slider, as HTML that needs nothing from elsewhere.
+"""Players of the agent while it learns: where it goes, its rewards, how far it is from the expert.
 
-The player is Matplotlib's own. What moves here is the agent while it learns, iteration by
-iteration: where it goes, which rewards it has been given, and how far it is from the expert.
+Methods are shown side by side, with a frame for each iteration. One file because what a player
+shows of a trial (`Course`) and how that is drawn change together.
 """
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import html
-import io
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.animation import FuncAnimation
@@ -27,7 +21,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
-from PIL import Image
 
 from replication.demos.model import Demos
 from replication.envs.maze import as_maze
@@ -36,26 +29,17 @@ from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.replay import replay
 from replication.evidence.experiments import Key
 from replication.irl import Trial, get_method
-from replication.report.field import draw_pitch
 from replication.report.maze import draw_map, map_numbers, places
-from replication.report.readable import F_LABELS
+from replication.report.moving import DPI, Player, player
+from replication.report.pitch import draw_pitch
+from replication.report.readable import full_label
 from replication.report.style import legend_below, style
 
 Floats = NDArray[np.float64]
 
-DPI = 100
 FRAMES_A_SECOND = 3
 MOST_FRAMES = 120
 REWARD_MAP = "PiYG"
-
-
-@dataclass(frozen=True)
-class Player:
-    """A moving figure as HTML, its numbers, and what it shows in words."""
-
-    html: str
-    numbers: pd.DataFrame
-    words: str
 
 
 @dataclass(frozen=True)
@@ -83,8 +67,7 @@ class Course:
     @property
     def label(self) -> str:
         """How it is called."""
-        label = get_method(self.method).label
-        return f"{label}, {F_LABELS[self.reading]}" if self.reading else label
+        return full_label(self.method, self.reading)
 
     @property
     def iterations(self) -> int:
@@ -93,15 +76,7 @@ class Course:
 
 
 def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
-    """Return what a player shows of some trials that kept their snapshots.
-
-    Parameters
-    ----------
-    demos
-        Where they learned: a maze or the soccer field.
-    trials
-        By method and reading of Eq. 9.
-    """
+    """Return the courses of trials that kept their snapshots, in a maze or on the soccer field."""
     shown = []
     for (method, reading), trial in trials.items():
         assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
@@ -112,46 +87,39 @@ def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
 
 
 def learning_player(demos: Demos, shown: Sequence[Course]) -> Player:
-    """Return a player with a frame for each iteration, the methods side by side.
+    """Return a player of some courses.
 
     A method that has converged keeps its last frame until all have. Of very many iterations some
     are left out, evenly.
     """
-    words = _describe(shown)
-    html = player(_animation(demos, shown), words, frames_a_second=FRAMES_A_SECOND)
-    return Player(html, _numbers(shown), words)
-
-
-def _numbers(shown: Sequence[Course]) -> pd.DataFrame:
-    """Return a row for each method and iteration."""
-    rows = [
-        {
-            "method": course.method,
-            "reading": course.reading,
-            "iteration": i,
-            "error": course.errors[i],
-            "moves": len(course.ways[i]) - 1,
-            "last_x": course.ways[i][-1, 0],
-            "last_y": course.ways[i][-1, 1],
-            "lowest_weight": course.weights[i].min(),
-            "highest_weight": course.weights[i].max(),
-        }
-        for course in shown
-        for i in range(course.iterations + 1)
-    ]
-    return pd.DataFrame(rows)
-
-
-def _describe(shown: Sequence[Course]) -> str:
     ends = [
         f"{course.label}: d = 0 after {course.iterations}"
         if course.errors[-1] == 0
         else f"{course.label}: d = {course.errors[-1]:.3g}"
         for course in shown
     ]
-    return (
+    words = (
         "The agent's way, its reward weights and its error, iteration by iteration, one trial of "
         f"each method side by side. Iterations to the end: {'; '.join(ends)}."
+    )
+    html = player(_animation(demos, shown), words, frames_a_second=FRAMES_A_SECOND)
+    return Player(html, pd.concat(map(_numbers, shown), ignore_index=True), words)
+
+
+def _numbers(course: Course) -> pd.DataFrame:
+    """Return a row for each iteration."""
+    return pd.DataFrame(
+        {
+            "method": course.method,
+            "reading": course.reading,
+            "iteration": range(course.iterations + 1),
+            "error": course.errors,
+            "moves": [len(way) - 1 for way in course.ways],
+            "last_x": [way[-1, 0] for way in course.ways],
+            "last_y": [way[-1, 1] for way in course.ways],
+            "lowest_weight": course.weights.min(axis=1),
+            "highest_weight": course.weights.max(axis=1),
+        }
     )
 
 
@@ -170,19 +138,16 @@ def _animation(demos: Demos, shown: Sequence[Course]) -> FuncAnimation:
             curve.set(xlim=(0, longest), ylim=(0, highest * 1.05), xlabel="iteration")
             curve.label_outer()
         grid[1, 0].set_ylabel("error d")
-        bar = figure.colorbar(
-            ScalarMappable(norm, REWARD_MAP), ax=grid[0].tolist(), shrink=0.8, pad=0.01
-        )
+        colours = ScalarMappable(norm, REWARD_MAP)
+        bar = figure.colorbar(colours, ax=grid[0].tolist(), shrink=0.8, pad=0.01)
         bar.set_ticks([-most, 0, most], labels=["avoid", "0", "seek"])
         bar.set_label("reward weight (√ of its size)", labelpad=-2)
-        legend_below(
-            figure,
-            [
-                Line2D([], [], color="0.1", label="the agent's way", lw=1.6),
-                Line2D([], [], color="0.1", marker="o", ms=4, lw=0, label="where it ends"),
-                Line2D([], [], color="0.45", ls=":", lw=1.4, label="the expert's way"),
-            ],
-        )
+        handles = [
+            Line2D([], [], color="0.1", label="the agent's way", lw=1.6),
+            Line2D([], [], color="0.1", marker="o", ms=4, lw=0, label="where it ends"),
+            Line2D([], [], color="0.45", ls=":", lw=1.4, label="the expert's way"),
+        ]
+        legend_below(figure, handles)
 
         def draw(frame: int) -> list[Any]:
             for panel in panels:
@@ -193,13 +158,8 @@ def _animation(demos: Demos, shown: Sequence[Course]) -> FuncAnimation:
         for _ in range(2):  # the first layout does not know yet how high the titles stand
             figure.draw_without_rendering()
         figure.set_layout_engine("none")
-        animation = FuncAnimation(
-            figure,
-            draw,
-            frames=np.linspace(0, longest, min(longest + 1, MOST_FRAMES)).round().astype(int),
-            cache_frame_data=False,
-        )
-    return animation
+        frames = np.linspace(0, longest, min(longest + 1, MOST_FRAMES)).round().astype(int)
+        return FuncAnimation(figure, draw, frames=frames, cache_frame_data=False)
 
 
 class _Canvas(FigureCanvasAgg):
@@ -219,9 +179,8 @@ class _Panel:
         self.above = above
         corners = _backdrop(demos, above)
         self.coloured = np.flatnonzero(course.weights.any(axis=0))
-        self.rewards = PolyCollection(
-            list(corners[self.coloured]), cmap=REWARD_MAP, norm=norm, lw=0, zorder=1
-        )
+        shapes = list(corners[self.coloured])
+        self.rewards = PolyCollection(shapes, cmap=REWARD_MAP, norm=norm, lw=0, zorder=1)
         above.add_collection(self.rewards, autolim=False)
         expert = _way(demos, demos.correct[0].states, demos.correct[0].actions)
         above.plot(*expert.T, color="0.45", ls=":", lw=1.4, zorder=4)
@@ -274,7 +233,7 @@ def _backdrop(demos: Demos, panel: Axes) -> Floats:
 def _way(demos: Demos, states: NDArray[np.int64], actions: NDArray[np.int64]) -> Floats:
     """Return where an episode leads, x and y [T + 1, 2]."""
     if isinstance(demos.environment, SoccerField):
-        return replay(demos.environment, actions).poses[:, :2]
+        return replay(demos.environment, actions)[["x", "y"]].to_numpy()
     return np.stack(places(as_maze(demos.environment), states), axis=1).astype(float)
 
 
@@ -288,54 +247,3 @@ def _shown_weights(demos: Demos, weights: Floats) -> Floats:
     cells = weights.reshape(len(weights), rules.COLUMNS * rules.ROWS, -1)
     greatest = np.abs(cells).argmax(axis=2)
     return np.take_along_axis(cells, greatest[..., None], axis=2)[..., 0]
-
-
-# --- the player ------------------------------------------------------------------------------
-
-_ICONS = {
-    "fa-minus": "&minus;",
-    "fa-fast-backward": "|&lt;",
-    "fa-step-backward": "&lt;",
-    "fa-play fa-flip-horizontal": "&#9664;",
-    "fa-pause": "||",
-    "fa-play": "&#9654;",
-    "fa-step-forward": "&gt;",
-    "fa-fast-forward": "&gt;|",
-    "fa-plus": "+",
-}
-
-
-def player(animation: FuncAnimation, description: str, *, frames_a_second: int) -> str:
-    """Return an animation as HTML with buttons and a slider, which needs nothing from elsewhere.
-
-    Matplotlib's player loads its icons from the web, has a random id, and names neither picture nor
-    slider for those who cannot see them.
-
-    Parameters
-    ----------
-    animation
-        What moves.
-    description
-        What it shows, in words.
-    frames_a_second
-        How fast it plays at first.
-    """
-    with style(), mpl.rc_context({"savefig.dpi": DPI}):
-        text = animation.to_jshtml(fps=frames_a_second, default_mode="once")
-    text = re.sub(r"<link[^>]*>\s*", "", text)
-    text = re.sub(r'<i class="fa ([^"]*)"></i>', lambda match: _ICONS[match[1]], text)
-    text = re.sub(r'(?<=data:image/png;base64,)[^"]*', lambda match: _smaller(match[0]), text)
-    (random_id,) = re.findall(r'<img id="_anim_img(\w+)"', text)
-    content = hashlib.sha256(text.replace(random_id, "").encode()).hexdigest()
-    text = text.replace('<img id="', f'<img alt="{html.escape(description)}" id="')
-    text = text.replace('type="range"', 'type="range" aria-label="Frame"')
-    return text.replace(random_id, content[: len(random_id)])
-
-
-def _smaller(encoded: str) -> str:
-    """Return a PNG, in base 64, in 256 colours: a fourth of the bytes, and it looks the same."""
-    with Image.open(io.BytesIO(base64.b64decode(encoded.replace("\\\n", "")))) as frame:
-        few = frame.convert("RGB").quantize(method=Image.Quantize.FASTOCTREE)
-    buffer = io.BytesIO()
-    few.save(buffer, format="PNG", optimize=True)
-    return base64.b64encode(buffer.getvalue()).decode()

@@ -37,36 +37,36 @@ def markdown(table: pd.DataFrame) -> str:
 # --- forms -----------------------------------------------------------------------------------
 
 
-def number(name: str) -> Form:
-    """Show a number with two decimals, or a dash if there is none."""
-    return lambda row: _number(getattr(row, name))
+def full_label(method: str, reading: str) -> str:
+    """Return a method's label, with the reading of Eq. 9 if it has one."""
+    label = get_method(method).label
+    return f"{label}, {F_LABELS[reading]}" if reading else label
 
 
-def interval(middle: str, low: str, high: str) -> Form:
-    """Show a number with its interval, if it has one."""
-    return lambda row: _interval(getattr(row, middle), getattr(row, low), getattr(row, high))
-
-
-def p_value(name: str) -> Form:
-    """Show a p-value, a small one without false digits."""
-    return lambda row: _p_value(getattr(row, name))
-
-
-def capped(row: Any) -> str:
-    """Show how many trials ended at the cap."""
-    return f"{row.capped} of {row.n}"
-
-
-def _number(x: float) -> str:
+def number(x: float) -> str:
+    """Return a number with two decimals, or a dash if there is none."""
     return "–" if np.isnan(x) else f"{x:.2f}"
 
 
-def _interval(middle: float, low: float, high: float) -> str:
-    return _number(middle) if np.isnan(low) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
+def interval(middle: float, low: float, high: float) -> str:
+    """Return a number with its interval, if it has one."""
+    return number(middle) if np.isnan(low) else f"{middle:.2f} [{low:.2f}, {high:.2f}]"
 
 
-def _p_value(p: float) -> str:
+def p_value(p: float) -> str:
+    """Return a p-value, a small one without false digits."""
     return "–" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+METHOD: dict[str, Form] = {
+    "Method": lambda row: get_method(row.method).label,
+    "Reading": lambda row: F_LABELS[row.reading],
+}
+MEAN: dict[str, Form] = {
+    "Mean [95 %]": lambda row: interval(row.mean, row.low, row.high),
+    "SD": lambda row: number(row.sd),
+}
+CAPPED: dict[str, Form] = {"At the cap": lambda row: f"{row.capped} of {row.n}"}
 
 
 # --- tables of the experiments ---------------------------------------------------------------
@@ -74,17 +74,14 @@ def _p_value(p: float) -> str:
 
 def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
     """Return a summary of methods: mean (SD) beside the paper's."""
-    columns: dict[str, Form] = {
-        "Method": lambda row: get_method(row.method).label,
-        "Reading": lambda row: F_LABELS[row.reading],
-        "Mean [95 %]": interval("mean", "low", "high"),
-        "SD": number("sd"),
-        "Median (quartiles)": lambda row: f"{row.median:g} ({row.quartile_1:g}–{row.quartile_3:g})",
-        "At the cap": capped,
-    }
+    columns = METHOD | MEAN
+    columns["Median (quartiles)"] = lambda row: (
+        f"{row.median:g} ({row.quartile_1:g}–{row.quartile_3:g})"
+    )
+    columns |= CAPPED
     if "paper_mean" in table:
         columns["Paper: mean (SD)"] = lambda row: (
-            "–" if np.isnan(row.paper_mean) else f"{row.paper_mean:.2f} ({_number(row.paper_sd)})"
+            "–" if np.isnan(row.paper_mean) else f"{row.paper_mean:.2f} ({number(row.paper_sd)})"
         )
     if "predicted_low" in table:
         columns["Predicted mean"] = lambda row: (
@@ -101,12 +98,12 @@ def readable_contrasts(table: pd.DataFrame) -> pd.DataFrame:
         table,
         {
             "Compared": lambda row: f"{get_method(row.x).label} against {get_method(row.y).label}",
-            "Reading": lambda row: F_LABELS[row.reading],
-            "Iterations [95 %]": interval("difference", "low", "high"),
-            "SD × [95 %]": interval("sd_ratio", "sd_low", "sd_high"),
-            "P(fewer)": number("fewer"),
-            "p, signed rank": p_value("p_wilcoxon"),
-            "p, spread": p_value("p_spread"),
+            "Reading": METHOD["Reading"],
+            "Iterations [95 %]": lambda row: interval(row.difference, row.low, row.high),
+            "SD × [95 %]": lambda row: interval(row.sd_ratio, row.sd_low, row.sd_high),
+            "P(fewer)": lambda row: number(row.fewer),
+            "p, signed rank": lambda row: p_value(row.p_wilcoxon),
+            "p, spread": lambda row: p_value(row.p_spread),
         },
     )
 
@@ -118,11 +115,11 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
     for reading, rows in table.groupby("reading", sort=False):
         label = F_LABELS[reading]
         columns: dict[str, Form] = {
-            f"{label}: mean (SD)": lambda row: f"{_number(row.mean)} ({_number(row.sd)})",
+            f"{label}: mean (SD)": lambda row: f"{number(row.mean)} ({number(row.sd)})",
             f"{label}: saves": lambda row: (
                 "–"
                 if row.set == "none"
-                else _interval(0 - row.difference, 0 - row.high, 0 - row.low)
+                else interval(0 - row.difference, 0 - row.high, 0 - row.low)
             ),
         }
         parts.append(readable(rows, columns))
@@ -137,9 +134,12 @@ def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for _, part in table.groupby("id", sort=False):
         first = part.iloc[0]
-        row = {"Claim": first["claim"], "Place": first["place"], "Paper": _paper(first)}
+        paper = number(first["paper"])
+        if first["statistic"] == "sd-ratio":
+            paper = f"× {paper}"
         # A method without a trace has its effect in the first column only.
         effects = {row.reading or READINGS[0]: _effect(row) for row in part.itertuples()}
+        row = {"Claim": first["claim"], "Place": first["place"], "Paper": paper}
         row |= {F_LABELS[reading]: effects.get(reading, "–") for reading in READINGS}
         rows.append({**row, "Verdict": _verdict(part)})
     return pd.DataFrame(rows)
@@ -147,19 +147,13 @@ def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
 
 def verdict_lines(table: pd.DataFrame) -> list[str]:
     """Return judged claims for a terminal, below a head: a line each, the verdict first."""
-    head = {"Verdict": "verdict", "Paper": "paper"} | {F_LABELS[f]: F_LABELS[f] for f in READINGS}
-    rows = [head | {"Claim": "claim"}]
-    for (id, part), row in zip(
-        table.groupby("id", sort=False), readable_verdicts(table).to_dict("records"), strict=True
-    ):
-        verdict = overall(part["verdict"].tolist())
-        rows.append(row | {"Verdict": verdict, "Claim": LABELS.get(str(id), str(id))})
-    return [
-        f"{row['Verdict']:<16}{row['Paper']:<8}"
-        + "".join(f"{row[F_LABELS[f]]:<23}" for f in READINGS)
-        + row["Claim"]
-        for row in rows
-    ]
+    lines = [("verdict", "paper", *(F_LABELS[reading] for reading in READINGS), "claim")]
+    shown = readable_verdicts(table).to_dict("records")
+    for (id, part), row in zip(table.groupby("id", sort=False), shown, strict=True):
+        effects = (row[F_LABELS[reading]] for reading in READINGS)
+        verdict, claim = overall(part["verdict"].tolist()), LABELS.get(str(id), str(id))
+        lines.append((verdict, row["Paper"], *effects, claim))
+    return ["{:<16}{:<8}{:<23}{:<23}{}".format(*line) for line in lines]
 
 
 def _verdict(part: pd.DataFrame) -> str:
@@ -173,17 +167,13 @@ def _verdict(part: pd.DataFrame) -> str:
     return f"**{verdict}**" if verdict == REPRODUCED else verdict
 
 
-def _paper(row: pd.Series) -> str:
-    return f"× {row['paper']:.2f}" if row["statistic"] == "sd-ratio" else _number(row["paper"])
-
-
 def _effect(row: Any) -> str:
     """Return an effect with its interval, in the unit of its statistic."""
     if np.isnan(row.effect):
         return "–"
     if row.statistic == "published-run":
         return f"median {row.effect:g}; {row.low:.0f} to {row.high:.0f}"
-    text = _interval(row.effect, row.low, row.high)
+    text = interval(row.effect, row.low, row.high)
     return f"× {text}" if row.statistic == "sd-ratio" else text
 
 
@@ -220,7 +210,7 @@ def readable_levels(table: pd.DataFrame, claim: str) -> pd.DataFrame:
         {
             "Choice": lambda row: row.choice,
             "Value": lambda row: f"{row.value} (default)" if row.default else str(row.value),
-            "Mean effect": number("mean_effect"),
+            "Mean effect": lambda row: number(row.mean_effect),
             "Holds": lambda row: f"{row.holds:.0%}",
             "Reversed": lambda row: f"{row.reversed:.0%}",
         },
@@ -229,16 +219,9 @@ def readable_levels(table: pd.DataFrame, claim: str) -> pd.DataFrame:
 
 def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table of ablations: each setting, and how many more iterations than the first."""
-    return readable(
-        table,
-        {
-            "Method": lambda row: get_method(row.method).label,
-            "Reading": lambda row: F_LABELS[row.reading],
-            "Choices": lambda row: row.choices,
-            "Mean [95 %]": interval("mean", "low", "high"),
-            "SD": number("sd"),
-            "Median": lambda row: f"{row.median:g}",
-            "At the cap": capped,
-            "More than the first [95 %]": interval("more", "more_low", "more_high"),
-        },
-    )
+    more: dict[str, Form] = {
+        "More than the first [95 %]": lambda row: interval(row.more, row.more_low, row.more_high)
+    }
+    choices: dict[str, Form] = {"Choices": lambda row: row.choices}
+    median: dict[str, Form] = {"Median": lambda row: f"{row.median:g}"}
+    return readable(table, METHOD | choices | MEAN | median | CAPPED | more)

@@ -12,49 +12,20 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 
 from replication.evidence.claims import short_label
-from replication.evidence.sensitivity import (
-    HOLDS,
-    NOISE,
-    OPEN,
-    REST,
-    UNDEFINED,
-    unchanged,
-)
+from replication.evidence.sensitivity import HOLDS, NOISE, OPEN, REST, UNDEFINED, unchanged
 from replication.evidence.specifications import DEFAULT
-from replication.report.axes import (
-    MARKS,
-    OUTCOMES,
-    READING_MARKS,
-    SMALL,
-    beside,
-    blocks,
-    counted,
-    handle,
-    holding,
-    label_blocks,
-    number,
-    outcome_handles,
-    pad,
-    reading_handles,
-    scale,
-    unit,
-)
+from replication.report import drawing
+from replication.report.drawing import OUTCOMES, SMALL, handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS
 from replication.report.style import canvas, legend_below, settled
-
-# --- one choice at a time ------------------------------------------------------------------------
 
 
 def single(effects: pd.DataFrame, claims: Sequence[str]) -> Picture:
     """Show the effects with one choice changed, a row for each value and a panel for each claim.
 
-    Parameters
-    ----------
-    effects
-        Of :func:`replication.evidence.sensitivity.effects_table`; the group "single" is drawn.
-    claims
-        The ids of two to four claims that have the same specifications.
+    `effects` is an :func:`~replication.evidence.sensitivity.effects_table`, of which the group
+    "single" is drawn for two to four claims that have the same specifications.
     """
     rows = effects[effects["group"] == "single"]
     parts = [rows[rows["claim"] == claim] for claim in claims]
@@ -64,7 +35,7 @@ def single(effects: pd.DataFrame, claims: Sequence[str]) -> Picture:
         usual, others = part.loc[default, "outcome"].item(), part[~default]
         texts.append(
             f"{claim} {usual if usual == HOLDS else 'is ' + usual} by default; with one choice "
-            f"changed it holds in {holding(others)}, is {counted(others)}; "
+            f"changed it holds in {drawing.holding(others)}, is {drawing.counted(others)}; "
             f"{int(unchanged(part).sum())} of them have the numbers of the default"
         )
     return Picture(pd.concat(parts, ignore_index=True), draw_single, f"{'. '.join(texts)}.")
@@ -76,47 +47,43 @@ def draw_single(numbers: pd.DataFrame) -> Figure:
     parts = [part for _, part in numbers.groupby("claim", sort=False)]
     names = parts[0]["specification"].tolist()
     rows = [(name.partition("=")[0], name.partition("=")[2]) for name in names]
-    y = blocks([id for id, _ in rows])
+    ids = [id for id, _ in rows]
+    y = drawing.blocks(ids)
     figure, axes = canvas(1, len(parts), height=1.5 + 0.128 * (y[-1] + 1), sharey=True)
     for panel, part in zip(axes, parts, strict=True):
         first = part.iloc[0]
         part = part.set_index("specification").loc[names].assign(y=y)
-        scale(panel, "x", first["statistic"], part["effect"])
+        drawing.scale(panel, "x", first["statistic"], part["effect"])
         panel.axvline(first["margin"], color="0.25", lw=1, zorder=1)
         panel.axvline(part.loc[DEFAULT, "effect"], color="0.1", lw=1, ls=(0, (4, 2)), zorder=1)
         for row in part[part["outcome"] != UNDEFINED].itertuples():
             colour = OUTCOMES[row.outcome]
             face = "white" if row.capped else colour
             panel.hlines(row.y, row.low, row.high, color=colour, lw=1.3)
-            panel.plot(row.effect, row.y, MARKS[row.outcome], ms=3.4, mec=colour, mfc=face)
+            panel.plot(row.effect, row.y, drawing.MARKS[row.outcome], ms=3.4, mec=colour, mfc=face)
         for row in part[part["outcome"] == UNDEFINED].itertuples():
-            beside(panel, UNDEFINED, 0, row.y, 2, color="0.35")
+            drawing.beside(panel, UNDEFINED, 0, row.y, 2, color="0.35")
         width = 78 // len(parts)
         title = textwrap.fill(short_label(first["claim"]), width)
         panel.set_title(f"{title}\n{first['claim']}", size=7.5)
-        label = "".join(unit(panel, "x", first["statistic"], first["measure"]))
+        label = "".join(drawing.unit(panel, "x", first["statistic"], first["measure"]))
         panel.set_xlabel(textwrap.fill(label, width), size=7.5)
         panel.tick_params(axis="x", labelsize=SMALL)
         panel.tick_params(axis="y", left=False, labelleft=False)
         panel.spines["left"].set_visible(False)
-        label_blocks(panel, rows, y, defaults={}, labelled=panel is axes[0])
+        drawing.shade_blocks(panel, ids, y)
+    drawing.label_blocks(axes[0], rows, y)
     capped = bool((numbers["capped"] > 0).any())
-    handles = outcome_handles("", "margin", capped=capped)
+    handles = drawing.outcome_handles("", "margin", capped=capped)
     handles.append(handle("default", "", "0.1", lw=1, ls=(0, (4, 2))))
     legend_below(figure, handles)
     return figure
 
 
-# --- which choices matter ------------------------------------------------------------------------
-
-
 def shares(table: pd.DataFrame) -> Picture:
     """Show what the variance of each claim's effect is due to, and how often each claim holds.
 
-    Parameters
-    ----------
-    table
-        Of :func:`replication.evidence.sensitivity.shares_table`.
+    `table` is a :func:`~replication.evidence.sensitivity.shares_table`.
     """
     choices = table[~table["choice"].isin([NOISE, REST, *OUTCOMES])].dropna(subset="share")
     largest = choices.loc[choices.groupby("claim", sort=False)["share"].idxmax()]
@@ -141,12 +108,12 @@ def draw_shares(numbers: pd.DataFrame) -> Figure:
     figure, axes = canvas(
         1, 3, height=1.7 + 0.32 * len(grid), sharey=True, width_ratios=(len(choices), 2, 5)
     )
-    pad(figure, wspace=0.02, h_pad=0.08)
+    drawing.pad(figure, wspace=0.02, h_pad=0.08)
     for panel, columns, colours in zip(axes, (choices, others), ("Blues", "Greys"), strict=False):
         values = grid[columns].to_numpy(float)
         panel.imshow(values, cmap=colours, vmin=0, vmax=1, aspect="auto")
         for (row, column), value in np.ndenumerate(values):
-            text = "–" if np.isnan(value) else number(round(100 * value))
+            text = "–" if np.isnan(value) else drawing.number(round(100 * value))
             text = "≥100" if columns[column] == NOISE and value >= 1 else text
             colour = "white" if value > 0.55 else "0.15" if abs(value) >= 0.005 else "0.65"
             panel.text(column, row, text, size=7, ha="center", va="center_baseline", color=colour)
@@ -178,16 +145,10 @@ def draw_shares(numbers: pd.DataFrame) -> Figure:
     return figure
 
 
-# --- the number of incorrect demonstrations ------------------------------------------------------
-
-
 def numbers(table: pd.DataFrame) -> Picture:
     """Show the iterations saved against the number of marked pairs.
 
-    Parameters
-    ----------
-    table
-        Of :func:`replication.evidence.sweep.numbers_table`.
+    `table` is a :func:`~replication.evidence.sweep.numbers_table`.
     """
     parts = []
     for reading, rows in table.groupby("reading", sort=False):
@@ -211,7 +172,7 @@ def draw_numbers(numbers: pd.DataFrame) -> Figure:
     panel.axhline(0, color="0.25", lw=1)
     panel.axhline(numbers["paper"].iloc[0], color="0.3", lw=1, ls=(0, (4, 2)))
     for reading, rows in numbers.groupby("reading", sort=False):
-        mark, colour = READING_MARKS[str(reading)]
+        mark, colour = drawing.READING_MARKS[str(reading)]
         rows = rows.sort_values("pairs")
         low, high = rows["saved_low"], rows["saved_high"]
         panel.fill_between(rows["pairs"], low, high, color=colour, alpha=0.15, lw=0)
@@ -222,7 +183,7 @@ def draw_numbers(numbers: pd.DataFrame) -> Figure:
     panel.tick_params(axis="x", labelsize=7.5)
     panel.set(xlabel="marked pairs of state and action (incorrect demonstrations), log axis")
     panel.set(ylabel="iterations saved, same seeds")
-    handles = reading_handles(numbers)
+    handles = drawing.reading_handles(numbers)
     handles.append(Patch(color="0.4", alpha=0.25, lw=0, label="95 % interval of the mean"))
     handles.append(handle("the paper's saving", "", "0.3", lw=1, ls=(0, (4, 2))))
     legend_below(figure, handles)

@@ -10,13 +10,8 @@ import pandas as pd
 from IPython.display import Markdown
 
 from replication.demos.files import load_demos
-from replication.evidence.experiments import (
-    EXPERIMENTS,
-    Key,
-    applies,
-    method_conditions,
-    set_conditions,
-)
+from replication.evidence import experiments
+from replication.evidence.experiments import EXPERIMENTS, Key
 from replication.files import resolve
 from replication.irl import Trial
 from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
@@ -38,8 +33,7 @@ class Study(Outputs):
     experiment
         The experiment whose methods and learning parameters are used.
     demos
-        The file of the demonstrations. If they are not of the experiment's own task, nothing is
-        published to compare with.
+        File of demonstrations. If they are of another task, nothing is published to compare with.
     choices
         Registered choices that differ from the experiment's.
     seed, jobs
@@ -68,7 +62,7 @@ class Study(Outputs):
         self.choices = {**design.choices, **choices}
         self.report = Report(**report)
         self.seed, self.jobs, self.store = seed, jobs, Store(resolve(store))
-        self.conditions = method_conditions(self.demos, self.choices, design.methods)
+        self.conditions = experiments.method_conditions(self.demos, self.choices, design.methods)
         own = self.demos.task == experiment
         self.published: Mapping[str, Published] = PUBLISHED[experiment] if own else {}
         curves = PUBLISHED_CURVES.get(experiment, {})
@@ -81,7 +75,7 @@ class Study(Outputs):
     @cached_property
     def sets(self) -> dict[Key, Condition]:
         """The conditions of the sets of incorrect demonstrations, by set and reading of Eq. 9."""
-        return set_conditions(self.demos, self.choices)
+        return experiments.set_conditions(self.demos, self.choices)
 
     @cached_property
     def results(self) -> Results:
@@ -105,7 +99,7 @@ class Study(Outputs):
         return {
             key: self.results.trial(condition, TRACED_TRIAL, snapshots=True)
             for key, condition in self.conditions.items()
-            if applies(key[1], reading)
+            if experiments.applies(key[1], reading)
         }
 
     def show(self, table: pd.DataFrame) -> Markdown:

@@ -44,9 +44,6 @@ STYLE: dict[Any, Any] = {
 CORRECT_COLOUR = "#D0021B"
 KIND_COLOURS = {"hit": "#0B3C8C", "detour": "#56A3E8"}
 OTHER_KIND_COLOUR = "#009E73"
-LEARNED_COLOUR = "#0072B2"
-OBSTACLE_COLOUR = "#8C8C8C"
-START_COLOUR, GOAL_COLOUR = "#E24A33", "#2CA02C"
 
 WIDTH = 7.0
 """Inches: both columns of a page."""

@@ -20,7 +20,7 @@ from replication.evidence.specifications import (
 )
 from replication.evidence.tables import read_table, write_csv
 from replication.report import calibration, sensitivity, specification_curve, verdicts
-from replication.report.axes import OUTCOMES, UNITS
+from replication.report.drawing import OUTCOMES, UNITS
 from replication.report.picture import Picture
 from replication.report.style import save_figure
 
@@ -204,6 +204,18 @@ def test_curve_without_some_effects() -> None:
     assert "of 239 specifications" in text.get_text()
     assert "239 specifications" in figure.axes[2].get_xlabel()
     assert "1 more have none" in figure.axes[2].get_xlabel()
+
+
+def test_curve_without_any_effect_is_drawn_without_counts() -> None:
+    """Where no specification has an effect, as with two trials, the curve says so and is empty."""
+    nothing = {"effect": np.nan, "low": np.nan, "high": np.nan, "outcome": "undefined"}
+    picture = specification_curve.curve(EFFECTS.assign(**nothing), "STEADIER")
+    assert "STEADIER has no effect in any of 240 specifications" in picture.words
+    figure = drawn(picture)
+    assert not figure.axes[0].texts
+    assert "0 specifications" in figure.axes[2].get_xlabel()
+    labels = [text.get_text() for text in drawn(PICTURES["ratios"]).axes[2].texts]
+    assert [text.get_text() for text in figure.axes[2].texts] == labels
 
 
 def test_defaults_are_bold(drawings: dict[str, Figure]) -> None:

@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from replication import Demos
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import Key
 from replication.irl import METHODS
 from replication.paper.published import TABLE_1
 from replication.report.curves import (
@@ -17,11 +16,10 @@ from replication.report.curves import (
     median_trial,
     sets,
 )
+from replication.trials.condition import Condition
 from replication.trials.results import Results
-from replication.trials.run import run_trials
-from replication.trials.store import Store
 
-FEW = {"episodes": 100, "horizon": 40}
+Conditions = dict[Key, Condition]
 
 ERRORS = pd.DataFrame(
     {
@@ -49,17 +47,8 @@ SAVED = pd.DataFrame(
 )
 
 
-@pytest.fixture(scope="module")
-def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Results:
-    """Run a few trials of every method."""
-    store = Store(tmp_path_factory.mktemp("curves") / "trials.sqlite")
-    conditions = list(method_conditions(small_demos, FEW).values())
-    return run_trials(conditions, trials=4, store=store, seed=2)
-
-
-def test_errors_are_those_of_the_trials(small_demos: Demos, results: Results) -> None:
+def test_errors_are_those_of_the_trials(conditions: Conditions, results: Results) -> None:
     """Each condition has the drawn trial and the quartiles of all at each iteration."""
-    conditions = method_conditions(small_demos, FEW)
     for median in (False, True):
         numbers = errors(results, conditions, {"unified": 47}, median=median).numbers
         assert len(numbers) == sum(results.errors(one).shape[1] for one in conditions.values())
@@ -74,9 +63,8 @@ def test_errors_are_those_of_the_trials(small_demos: Demos, results: Results) ->
             assert (rows["paper"] == 47).all() == (method == "unified")
 
 
-def test_iterations_are_those_of_the_trials(small_demos: Demos, results: Results) -> None:
+def test_iterations_are_those_of_the_trials(conditions: Conditions, results: Results) -> None:
     """Every trial has a row with its count, how many are like it, our mean and the paper's."""
-    conditions = method_conditions(small_demos, FEW)
     numbers = iterations(results, conditions, {"unified": TABLE_1["unified"]}).numbers
     for (method, reading), condition in conditions.items():
         rows = numbers[(numbers["method"] == method) & (numbers["reading"] == reading)]
@@ -87,15 +75,15 @@ def test_iterations_are_those_of_the_trials(small_demos: Demos, results: Results
         assert (rows["paper"] == 40.1).all() == (method == "unified")
 
 
-def test_a_method_without_a_trace_is_in_every_panel(small_demos: Demos, results: Results) -> None:
+def test_a_method_without_a_trace_is_in_every_panel(
+    conditions: Conditions, results: Results
+) -> None:
     """AdaBoost-IRL's line is drawn under both readings of Eq. 9, from the same rows."""
-    conditions = method_conditions(small_demos, FEW, ["adaboost", "unified"])
-    numbers = iterations(results, conditions, {}).numbers
-    panels = draw_iterations(numbers).axes[::2]
+    two = {key: conditions[key] for key in conditions if key[0] in ("adaboost", "unified")}
+    panels = draw_iterations(iterations(results, two, {}).numbers).axes[::2]
     assert [panel.get_title(loc="left") for panel in panels] == ["Fᵢ (printed)", "Fᵢ₊₁ (updated)"]
     for panel in panels:
-        first, second = panel.lines
-        colours = [first.get_color(), second.get_color()]
+        colours = [line.get_color() for line in panel.lines]
         assert colours == [METHODS[name].colour for name in ("adaboost", "unified")]
     drawn = [np.asarray(panel.lines[0].get_ydata()).tolist() for panel in panels]
     assert drawn[0] == drawn[1] == results.iterations(conditions["adaboost", ""]).tolist()
@@ -155,9 +143,9 @@ def test_no_sets_are_a_figure_too() -> None:
     assert panel.get_title() == "no incorrect demonstrations"
 
 
-def test_words_hold_the_numbers(small_demos: Demos, results: Results) -> None:
+def test_words_hold_the_numbers(conditions: Conditions, results: Results) -> None:
     """The alternative texts give when half of the trials are at zero, and the means."""
-    condition = method_conditions(small_demos, FEW)["unified", "printed"]
+    condition = conditions["unified", "printed"]
     one = {("unified", "printed"): condition}
     counts = results.iterations(condition)
     name = "Unified, without incorrect, Fᵢ (printed)"

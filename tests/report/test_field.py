@@ -6,7 +6,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from replication import Demos
-from replication.demos.soccer_expert import demonstrate_soccer
 from replication.envs.soccer import rules
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.replay import replay
@@ -17,15 +16,9 @@ FIELD = SoccerField()
 
 
 @pytest.fixture(scope="module")
-def demos() -> Demos:
-    """Let the expert demonstrate."""
-    return demonstrate_soccer("soccer", FIELD)
-
-
-@pytest.fixture(scope="module")
-def numbers(demos: Demos) -> pd.DataFrame:
+def numbers(soccer_demos: Demos) -> pd.DataFrame:
     """Replay the demonstrations."""
-    return demonstrations(demos).numbers
+    return demonstrations(soccer_demos).numbers
 
 
 @pytest.fixture(scope="module")
@@ -34,49 +27,47 @@ def drawing(numbers: pd.DataFrame) -> Figure:
     return draw_demonstrations(numbers)
 
 
-def test_numbers_equal_the_replay(demos: Demos, numbers: pd.DataFrame) -> None:
+def test_numbers_equal_the_replay(soccer_demos: Demos, numbers: pd.DataFrame) -> None:
     """The table's positions and detections are, in order, the states of every demonstration."""
-    everyone = demos.correct + demos.incorrect
-    assert numbers["demo"].unique().tolist() == [demo.name for demo in everyone]
-    for demo in everyone:
-        rows = numbers[numbers["demo"] == demo.name]
-        assert rows["decision"].tolist() == list(range(len(demo.states)))
-        assert set(rows["kind"]) == {demo.kind}
+    everyone = soccer_demos.correct + soccer_demos.incorrect
+    groups = numbers.groupby(["kind", "demo"], sort=False)
+    assert [key for key, _ in groups] == [(demo.kind, demo.name) for demo in everyone]
+    for (_, rows), demo in zip(groups, everyone, strict=True):
         places = zip(rows["x"], rows["y"], rows["detected"], strict=True)
         assert [rules.encode(*place) for place in places] == demo.states.tolist()
         actions = [rules.ACTIONS.index(name) for name in rows["action"] if name]
         assert actions == demo.actions.tolist()
-        seen = rows[[f"obstacle_{n}_seen" for n in (1, 2, 3)]]
-        assert (seen.any(axis=1) == rows["detected"]).all()
 
 
-def test_ways_are_drawn_as_replayed(drawing: Figure, demos: Demos) -> None:
+def test_ways_are_drawn_as_replayed(drawing: Figure, soccer_demos: Demos) -> None:
     """Fig. 11 shows every position of the correct demo, unsmoothed and to scale, in both panels."""
-    way = replay(FIELD, demos.correct[0].actions).poses[:, :2]
+    way = replay(FIELD, soccer_demos.correct[0].actions)[["x", "y"]].to_numpy()
     for panel in drawing.axes:
         assert panel.get_aspect() == 1
         assert any(np.array_equal(np.asarray(line.get_xydata()), way) for line in panel.lines)
 
 
-def test_contacts_are_crossed(drawing: Figure, demos: Demos) -> None:
+def test_contacts_are_crossed(drawing: Figure, soccer_demos: Demos) -> None:
     """There is a cross for each demo that ends with a contact, and for no other."""
     crosses = [line for line in drawing.axes[1].lines if line.get_marker() == "x"]
-    touching = [demo for demo in demos.incorrect if replay(FIELD, demo.actions).touched[-1]]
+    touching = [
+        demo for demo in soccer_demos.incorrect if replay(FIELD, demo.actions)["touched"].iloc[-1]
+    ]
     assert len(crosses) == len(touching)
     hits = [demo for demo in touching if demo.kind == "hit"]
-    ends = [replay(FIELD, demo.actions).poses[-1, :2] for demo in hits]
+    ends = [replay(FIELD, demo.actions).iloc[-1][["x", "y"]].astype(float) for demo in hits]
     drawn = [np.ravel(line.get_xydata()) for line in crosses]
     assert all(any(np.allclose(end, place) for place in drawn) for end in ends)
 
 
-def test_words_hold_the_facts(demos: Demos) -> None:
+def test_words_hold_the_facts(soccer_demos: Demos) -> None:
     """The texts that stand for the pictures give what is measured, for these demos and fewer."""
-    words = demonstrations(demos).words
+    words = demonstrations(soccer_demos).words
     assert "15 decisions" in words
     assert "slowly in 3 decisions" in words
-    for kind in demos.kinds:
-        assert f"{sum(demo.kind == kind for demo in demos.incorrect)} {kind}" in words
-    assert "Incorrect" not in demonstrations(demos.select("none")).words
+    for kind in soccer_demos.kinds:
+        assert f"{sum(demo.kind == kind for demo in soccer_demos.incorrect)} {kind}" in words
+    assert "Incorrect" not in demonstrations(soccer_demos.select("none")).words
     assert "15 rays of 0.15 m" in start(FIELD).words
 
 

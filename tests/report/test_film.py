@@ -9,7 +9,6 @@ from matplotlib.animation import PillowWriter
 from PIL import Image, ImageSequence
 
 from replication import Demos
-from replication.demos.soccer_expert import demonstrate_soccer
 from replication.envs.soccer import rules
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.replay import replay
@@ -18,12 +17,6 @@ from replication.report.film import Film, film
 
 FIELD = SoccerField()
 CUT = 6
-
-
-@pytest.fixture(scope="module")
-def demos() -> Demos:
-    """Let the expert demonstrate."""
-    return demonstrate_soccer("soccer", FIELD)
 
 
 def moving(demos: Demos) -> Film:
@@ -57,11 +50,11 @@ def test_nothing_is_cut_off(titles: list[str], tmp_path: Path) -> None:
     assert all(panel is not None and panel.y0 > legend.get_window_extent().y1 for panel in panels)
 
 
-def test_gif_is_small_and_repeats(demos: Demos, tmp_path: Path) -> None:
+def test_gif_is_small_and_repeats(soccer_demos: Demos, tmp_path: Path) -> None:
     """The GIF is 7 inches wide at 90 dpi, and making it anew gives the same bytes."""
-    gif = moving(demos).save_gif(tmp_path / "new" / "film.gif")
+    gif = moving(soccer_demos).save_gif(tmp_path / "new" / "film.gif")
     with mpl.rc_context({"font.size": 20, "savefig.dpi": 30, "savefig.bbox": "tight"}):
-        again = moving(demos).save_gif(tmp_path / "again.gif")
+        again = moving(soccer_demos).save_gif(tmp_path / "again.gif")
     assert again.read_bytes() == gif.read_bytes()
     with Image.open(gif) as image:
         assert image.width == 630
@@ -72,9 +65,9 @@ def test_gif_is_small_and_repeats(demos: Demos, tmp_path: Path) -> None:
     assert gif.stat().st_size / len(durations) < 1.5e6 / 41
 
 
-def test_moving_titles_tell_the_end(demos: Demos, tmp_path: Path) -> None:
+def test_moving_titles_tell_the_end(soccer_demos: Demos, tmp_path: Path) -> None:
     """Each title shows time and decision, and at last why the episode ends or is cut."""
-    right = demos.correct[0].actions.tolist()
+    right = soccer_demos.correct[0].actions.tolist()
     pinned = [BACKWARD] * 9  # against the wall: it stays in its cell until the time is up
     cells = SoccerField(rules.SoccerParams(macro="cell", time_limit=60.0))
     shown = film(FIELD, {"a": [*right, LEFT], "b": [LEFT] * 2, "c": [LEFT] * 99}, decisions=16)
@@ -84,15 +77,16 @@ def test_moving_titles_tell_the_end(demos: Demos, tmp_path: Path) -> None:
         play(each, tmp_path)
     ends = [panel.get_title(loc="left") for panel in shown.figure.axes + late.figure.axes]
     episode = replay(FIELD, right)
-    assert ends[0] == f"a\ngoal: {episode.times[-1]:.1f} s, {len(right)} decisions"
+    assert ends[0] == f"a\ngoal: {episode['time'].iloc[-1]:.1f} s, {len(right)} decisions"
     assert ends[1:3] == ["b\nends after 2 decisions", "c\ncut after 16 decisions"]
     assert re.fullmatch(r"d\ntime out: 6\d\.\d s, [2-8] decisions", ends[3])
     assert all(end.replace("\n", ": ") in shown.words for end in ends[:3])
 
 
-def test_numbers_have_every_decision(demos: Demos, tmp_path: Path) -> None:
+def test_numbers_have_every_decision(soccer_demos: Demos, tmp_path: Path) -> None:
     """The file beside a film has each episode in full, also where the film is cut."""
-    shown = film(FIELD, {"right": demos.correct[0].actions, "left": [LEFT] * 9}, decisions=2)
+    right = soccer_demos.correct[0].actions
+    shown = film(FIELD, {"right": right, "left": [LEFT] * 9}, decisions=2)
     play(shown, tmp_path)
     lengths = shown.numbers.groupby("episode", sort=False).size().to_dict()
-    assert lengths == {"right": len(demos.correct[0].states), "left": 10}
+    assert lengths == {"right": len(right) + 1, "left": 10}

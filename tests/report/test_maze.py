@@ -6,31 +6,25 @@ import pytest
 from replication import Demos
 from replication.envs.maze import MazeError, as_maze
 from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import Key
 from replication.irl import Trial
-from replication.report.maze import demonstrations, draw_surfaces, map_numbers, places, surfaces
-from replication.trials.compute import TRACED_TRIAL
+from replication.report.maze import demonstrations, draw_surfaces, map_numbers, surfaces
+from replication.trials.condition import Condition
 from replication.trials.measures import Report
-from replication.trials.run import run_trials
-from replication.trials.store import Store
+from replication.trials.results import Results
 
 
-@pytest.fixture(scope="module")
-def trial(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Trial:
-    """Let the unified method learn, and keep every iteration."""
-    condition = method_conditions(small_demos, {"episodes": 100, "horizon": 40})[
-        "unified", "printed"
-    ]
-    store = Store(tmp_path_factory.mktemp("maze") / "trials.sqlite")
-    results = run_trials([condition], trials=1, store=store, seed=2)
-    return results.trial(condition, TRACED_TRIAL, snapshots=True)
+@pytest.fixture
+def trial(conditions: dict[Key, Condition], results: Results) -> Trial:
+    """Return a trial of the unified method that kept every iteration."""
+    return results.trial(conditions["unified", "printed"], 0, snapshots=True)
 
 
 def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, trial: Trial) -> None:
     """Fig. 7: the best or mean action of Q half-way, Q at the end, and the reward at the end."""
     assert trial.snapshots is not None
     free = as_maze(small_demos.environment).free
-    middle = round(trial.iterations / 2)
+    middle, end = round(trial.iterations / 2), trial.iterations
     tables = {"q_mid": trial.snapshots.q[middle], "q_end": trial.q, "reward_end": trial.weights}
     for report, reduce in ((Report(), np.max), (Report(surface="mean"), np.mean)):
         numbers = surfaces(trial, small_demos.environment, report).numbers
@@ -39,8 +33,8 @@ def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, trial: Trial
             values = numbers[numbers["surface"] == name]["value"].to_numpy()
             np.testing.assert_array_equal(values[free], reduce(table, axis=1)[free])
             assert np.isnan(values[~free]).all()
-    iterations = numbers.groupby("surface", sort=False)["iteration"].first().tolist()
-    assert iterations == [middle, trial.iterations, trial.iterations]
+        first = numbers.groupby("surface", sort=False)["iteration"].first()
+        assert first.tolist() == [middle, end, end]
 
 
 def test_surfaces_are_named_in_words_and_titles(small_demos: Demos, trial: Trial) -> None:
@@ -52,34 +46,22 @@ def test_surfaces_are_named_in_words_and_titles(small_demos: Demos, trial: Trial
     assert f"{titles[1]}: {values['min']:.3g} to {values['max']:.3g}" in picture.words
 
 
-def test_cells_count_from_the_lower_left(small_demos: Demos) -> None:
-    """In the numbers, as in the figures, x goes right and y goes up."""
-    maze = as_maze(small_demos.environment)
-    x, y = places(maze, np.array([maze.start]))
-    assert (x.item(), y.item()) == (1, 1)
-    numbers = demonstrations(small_demos).numbers
-    first = numbers[numbers["part"] == "correct"].iloc[0]
-    assert (first["x"], first["y"], first["step"], first["kind"]) == (1, 1, 0, "correct")
-
-
 def test_map_by_hand(small_demos: Demos) -> None:
-    """The rows of a map are its corner, start, goal and obstacles."""
-    rows = map_numbers(as_maze(small_demos.environment))
-    assert rows[["kind", "x", "y"]].to_numpy().tolist() == [
-        ["corner", 6, 5],
-        ["start", 1, 1],
-        ["goal", 5, 4],
-        ["obstacle", 3, 3],
-    ]
+    """A map's rows are its corner, start, goal and obstacles; x goes right and y goes up."""
+    rows = map_numbers(as_maze(small_demos.environment))[["kind", "x", "y"]]
+    cells = [("corner", 6, 5), ("start", 1, 1), ("goal", 5, 4), ("obstacle", 3, 3)]
+    assert list(rows.itertuples(index=False, name=None)) == cells
 
 
 def test_every_visit_has_a_row(small_demos: Demos) -> None:
-    """Every state of every demonstration is there once, beside the map."""
+    """Every state of every demonstration is there once, beside the map, from the start on."""
     demos = (*small_demos.correct, *small_demos.incorrect)
     numbers = demonstrations(small_demos).numbers
     shown = numbers[numbers["part"] != "map"]
     assert len(shown) == sum(len(demo.states) for demo in demos)
     assert shown["demo"].unique().tolist() == [demo.name for demo in demos]
+    first = shown.iloc[0][["part", "kind", "step", "x", "y"]]
+    assert first.tolist() == ["correct", "correct", 0, 1, 1]
 
 
 def test_words_count_the_demonstrations(small_demos: Demos) -> None:

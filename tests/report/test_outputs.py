@@ -7,8 +7,8 @@ from IPython.core.interactiveshell import InteractiveShell
 
 from replication import Demos
 from replication.report.maze import demonstrations
+from replication.report.moving import Player
 from replication.report.outputs import Outputs, Shown
-from replication.report.players import Player
 
 
 def published(shown: Shown) -> tuple[dict[str, object], dict[str, object]]:

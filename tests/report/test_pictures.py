@@ -13,21 +13,17 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from replication import Demos, Params, fit
-from replication.demos.soccer_expert import demonstrate_soccer
-from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import method_conditions, set_conditions
+from replication import Demos
+from replication.evidence.experiments import Key
 from replication.evidence.tables import read_table, sets_table, write_csv
 from replication.paper.published import FIGURE_5, TABLE_1
 from replication.report import curves, field, maze
 from replication.report.picture import Picture
 from replication.report.style import save_figure
-from replication.trials.compute import TRACED_TRIAL
+from replication.trials.condition import Condition
 from replication.trials.measures import Report, measure_trials
-from replication.trials.run import run_trials
-from replication.trials.store import Store
+from replication.trials.results import Results
 
-FEW = {"episodes": 100, "horizon": 40}
 KINDS = [
     *("map", "map without incorrect", "surfaces", "errors", "errors of one", "iterations"),
     *("sets", "no sets", "field", "soccer", "soccer without incorrect"),
@@ -35,17 +31,17 @@ KINDS = [
 
 
 @pytest.fixture(scope="module")
-def pictures(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Picture]:
+def pictures(
+    small_demos: Demos,
+    soccer_demos: Demos,
+    conditions: dict[Key, Condition],
+    sets: dict[Key, Condition],
+    results: Results,
+) -> dict[str, Picture]:
     """Make each kind of picture once, of a few trials in a small maze and of the soccer field."""
-    conditions = method_conditions(small_demos, FEW)
-    sets = set_conditions(small_demos, FEW)
-    every = [*conditions.values(), *sets.values()]
-    store = Store(tmp_path_factory.mktemp("pictures") / "trials.sqlite")
-    results = run_trials(every, trials=3, store=store, seed=2)
-    saved = sets_table(measure_trials(results, every), sets)
-    traced = results.trial(conditions["unified", "printed"], TRACED_TRIAL, snapshots=True)
+    saved = sets_table(measure_trials(results, results.conditions), sets)
+    traced = results.trial(conditions["unified", "printed"], 0, snapshots=True)
     one = {("adaboost", ""): conditions["adaboost", ""]}
-    soccer = demonstrate_soccer("soccer", SoccerField())
     return {
         "map": maze.demonstrations(small_demos),
         "map without incorrect": maze.demonstrations(small_demos.select("none")),
@@ -55,9 +51,9 @@ def pictures(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> di
         "iterations": curves.iterations(results, conditions, TABLE_1),
         "sets": curves.sets(saved),
         "no sets": curves.sets(saved[saved["set"] == "none"]),
-        "field": field.start(soccer.environment),
-        "soccer": field.demonstrations(soccer),
-        "soccer without incorrect": field.demonstrations(soccer.select("none")),
+        "field": field.start(soccer_demos.environment),
+        "soccer": field.demonstrations(soccer_demos),
+        "soccer without incorrect": field.demonstrations(soccer_demos.select("none")),
     }
 
 
@@ -66,23 +62,18 @@ def tables(
     pictures: dict[str, Picture], tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, pd.DataFrame]:
     """Read the numbers of each picture back from its file."""
-    folder = tmp_path_factory.mktemp("tables")
-    return {
-        kind: read_table(write_csv(picture.numbers, folder / f"{kind}.csv"))
-        for kind, picture in pictures.items()
-    }
+    path = tmp_path_factory.mktemp("tables") / "numbers.csv"
+    return {kind: read_table(write_csv(pictures[kind].numbers, path)) for kind in pictures}
 
 
 @pytest.fixture(scope="module")
 def drawings(
     pictures: dict[str, Picture], tables: dict[str, pd.DataFrame], small_demos: Demos
 ) -> dict[str, Figure]:
-    """Draw each picture from its file, and a fit."""
-    result = fit(small_demos, params=Params.of(incorrect="all", episodes=200, horizon=50), seed=1)
-    return {
-        **{kind: picture.draw(tables[kind]) for kind, picture in pictures.items()},
-        "fit": maze.fit_figure(result),
-    }
+    """Draw each picture from its file, and what was learned from a user's own demonstrations."""
+    weights, errors = np.linspace(-1, 1, 42 * 4).reshape(42, 4), np.linspace(2, 0, 9)
+    own = maze.fit_figure(small_demos, small_demos.correct[0].states, weights, errors)
+    return {"fit": own, **{kind: pictures[kind].draw(tables[kind]) for kind in pictures}}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -110,28 +101,24 @@ def test_files_depend_on_the_figure_alone(
     kind: str, drawings: dict[str, Figure], tmp_path: Path
 ) -> None:
     """Saving twice gives the same PNG and SVG, without a time or a version in them."""
-    once = [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / "a")]
-    twice = [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / "b")]
+    once, twice = (
+        [path.read_bytes() for path in save_figure(drawings[kind], tmp_path / name)]
+        for name in ("a", "b")
+    )
     assert once == twice
     assert b"Matplotlib" not in once[0]
     assert b"dc:date" not in once[1]
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "fit"])
-def test_nothing_is_cut_off(kind: str, drawings: dict[str, Figure]) -> None:
-    """All that is drawn, texts included, lies within the figure."""
+def test_nothing_is_cut_off_or_covered(kind: str, drawings: dict[str, Figure]) -> None:
+    """All that is drawn lies within the figure, and no legend covers a panel or its labels."""
     figure = drawings[kind]
     box = figure.get_tightbbox(figure.canvas.get_renderer())  # type: ignore[attr-defined]
     width, height = figure.get_size_inches()
     assert min(box.x0, box.y0) > -0.01
     assert box.x1 < width + 0.01
     assert box.y1 < height + 0.01
-
-
-@pytest.mark.parametrize("kind", [*KINDS, "fit"])
-def test_legends_are_clear_of_the_panels(kind: str, drawings: dict[str, Figure]) -> None:
-    """No legend covers a panel or its labels."""
-    figure = drawings[kind]
     for legend in figure.legends:
         top = legend.get_window_extent().y1
         boxes = [panel.get_tightbbox() for panel in figure.axes]

@@ -25,7 +25,7 @@ from replication.trials.store import Store
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 40}
 
 
-def _settings(demos: Demos) -> list[Condition]:
+def _conditions(demos: Demos) -> list[Condition]:
     return [
         Condition(demos, method, Params.of(**FEW))
         for method in ("adaboost", "unified", "unified-incorrect")
@@ -33,7 +33,7 @@ def _settings(demos: Demos) -> list[Condition]:
 
 
 def _run(demos: Demos, path: Path, *, jobs: int = 1, trials: int = 4, seed: int = 5) -> Results:
-    return run_trials(_settings(demos), trials=trials, store=Store(path), jobs=jobs, seed=seed)
+    return run_trials(_conditions(demos), trials=trials, store=Store(path), jobs=jobs, seed=seed)
 
 
 def _bits(results: Results) -> list[bytes]:
@@ -44,6 +44,19 @@ def _bits(results: Results) -> list[bytes]:
         for trial in [results.trial(condition, k)]
         for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
     ]
+
+
+@pytest.fixture
+def chunks(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Agent, int]]:
+    """Record the agent and the size of each chunk that is computed."""
+    computed: list[tuple[Agent, int]] = []
+
+    def spy(agent: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
+        computed.append((agent, len(loops)))
+        return run(agent, loops)
+
+    monkeypatch.setattr(compute_module, "run", spy)
+    return computed
 
 
 @pytest.mark.parametrize("jobs", [2, 4])
@@ -61,52 +74,38 @@ def test_a_trial_does_not_depend_on_how_many_there_are(small_demos: Demos, tmp_p
     assert set(_bits(short)) <= set(_bits(long))
 
 
-def test_settings_that_share_a_task_are_computed_together(
-    small_demos: Demos, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_conditions_that_share_an_agent_are_computed_together(
+    small_demos: Demos, tmp_path: Path, chunks: list[tuple[Agent, int]]
 ) -> None:
     """In one chunk with those of other conditions, a trial has the bits that it has alone."""
     conditions = [
-        *_settings(small_demos),
+        *_conditions(small_demos),
         Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 3})),
     ]
-    chunks: list[int] = []
-
-    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
-        chunks.append(len(loops))
-        return run(task, loops)
-
-    monkeypatch.setattr(compute_module, "run", spy)
     together = run_trials(conditions, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
-    assert chunks == [3 * len(conditions)]
+    assert [size for _, size in chunks] == [3 * len(conditions)]
     for number, condition in enumerate(conditions):
         path = tmp_path / f"{number}.sqlite"
         for trials in (1, 2, 3):  # so that each is computed in a run of its own
             alone = run_trials([condition], trials=trials, store=Store(path), seed=5)
         together.conditions = [condition]
         assert _bits(alone) == _bits(together)
-    assert chunks[1:] == [1] * 3 * len(conditions)
+    assert [size for _, size in chunks[1:]] == [1] * 3 * len(conditions)
 
 
-def test_settings_of_other_tasks_are_computed_apart(
-    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_conditions_of_other_agents_are_computed_apart(
+    small_demos: Demos, store_path: Path, chunks: list[tuple[Agent, int]]
 ) -> None:
     """What learns by other parameters, or rolls out by them, shares no chunk."""
     conditions = [
         Condition(small_demos, "unified", Params.of(**FEW, ties=ties, rollout_ties=rollout_ties))
         for ties, rollout_ties in (("random", "random"), ("first", "random"), ("random", "first"))
     ]
-    tasks: list[Agent] = []
-
-    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
-        tasks.append(task)
-        return run(task, loops)
-
-    monkeypatch.setattr(compute_module, "run", spy)
     run_trials(conditions, trials=2, store=Store(store_path), seed=5)
-    assert tasks == [condition.agent for condition in conditions]
+    assert chunks == [(condition.agent, 2) for condition in conditions]
 
 
-def test_settings_know_the_hash_of_what_they_select(small_demos: Demos) -> None:
+def test_conditions_know_the_hash_of_what_they_select(small_demos: Demos) -> None:
     """The hash in a trial's key is that of the demonstrations that the method is given."""
     for incorrect in ("none", "hit", "all"):
         for method in ("adaboost", "unified", "unified-incorrect"):
@@ -211,7 +210,7 @@ def test_methods_share_their_seeds(small_demos: Demos, store_path: Path) -> None
     assert len(set(next(iter(first)))) > 1
 
 
-def test_equal_settings_are_run_once(small_demos: Demos, store_path: Path) -> None:
+def test_equal_conditions_are_run_once(small_demos: Demos, store_path: Path) -> None:
     """A condition that is given twice appears once in the results."""
     condition = Condition(small_demos, "unified", Params.of(**FEW))
     results = run_trials([condition, condition], trials=2, store=Store(store_path), seed=1)
@@ -231,34 +230,32 @@ def test_a_damaged_trial_is_computed_again(small_demos: Demos, store_path: Path)
 
 
 def test_a_killed_run_goes_on_from_the_store(
-    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
+    small_demos: Demos,
+    store_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    chunks: list[tuple[Agent, int]],
 ) -> None:
     """What a run that broke off had finished is not computed again."""
     conditions = [
         Condition(small_demos, "unified", Params.of(**FEW, ties=ties))
         for ties in ("random", "first")
     ]
-    computed: list[int] = []
     put = Store.put
 
-    def fail(self: Store, trials: list[tuple[str, Trial]]) -> None:
-        if computed:
-            raise KeyboardInterrupt
-        computed.append(len(trials))
+    def put_once(self: Store, trials: list[tuple[str, Trial]]) -> None:
         put(self, trials)
+        monkeypatch.setattr(Store, "put", lambda *_: interrupt())
 
-    monkeypatch.setattr(Store, "put", fail)
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Store, "put", put_once)
     with pytest.raises(KeyboardInterrupt):
         run_trials(conditions, trials=2, store=Store(store_path), seed=5)
     monkeypatch.setattr(Store, "put", put)
-
-    def spy(task: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
-        computed.append(len(loops))
-        return run(task, loops)
-
-    monkeypatch.setattr(compute_module, "run", spy)
+    chunks.clear()
     run_trials(conditions, trials=2, store=Store(store_path), seed=5)
-    assert computed == [2, 2]
+    assert chunks == [(conditions[1].agent, 2)]
 
 
 def test_a_worker_with_other_code_is_refused(
@@ -281,7 +278,7 @@ def test_trial_seeds_are_the_children_of_the_root() -> None:
 
 def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
     """Trials that differ in any of their parts but the snapshots have other digests."""
-    trial = _run(small_demos, store_path).trial(_settings(small_demos)[1], 0)
+    trial = _run(small_demos, store_path).trial(_conditions(small_demos)[1], 0)
     states, actions, hits = trial.episodes[0]
     turned = (type(trial.episodes[0])(states, actions, ~hits), *trial.episodes[1:])
     others = [
@@ -302,7 +299,7 @@ def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
 
 def test_digests_are_those_of_the_store(small_demos: Demos, store_path: Path) -> None:
     """What was computed and what is read back have one digest, so either can be verified."""
-    condition = _settings(small_demos)[1]
+    condition = _conditions(small_demos)[1]
     ((key, trial),) = compute_module.compute(condition.agent, [(condition, 1)], 5)
     _run(small_demos, store_path)
     assert digest(Store(store_path).get(key)) == digest(trial)

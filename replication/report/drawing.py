@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,9 +40,6 @@ UNITS = {
 def number(value: float) -> str:
     """Return a number with three digits and a proper minus."""
     return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
-
-
-# --- scales --------------------------------------------------------------------------------------
 
 
 class Ratios(Locator):
@@ -95,9 +92,6 @@ def pad(figure: Figure, **pads: float) -> None:
     engine.set(**pads)
 
 
-# --- rows ----------------------------------------------------------------------------------------
-
-
 def blocks(ids: Sequence[Hashable]) -> NDArray[np.float64]:
     """Return where rows lie, with a gap wherever the id changes."""
     changes = [0.0, *(float(a != b) for a, b in zip(ids[1:], ids[:-1], strict=True))]
@@ -106,41 +100,29 @@ def blocks(ids: Sequence[Hashable]) -> NDArray[np.float64]:
 
 def beside(panel: Axes, text: str, x: float, y: float, points: float, **style: Any) -> None:
     """Write beside a row: so many points right of an end of the panel, x = 0 or 1."""
-    panel.annotate(
-        text,
-        (x, y),
-        (points, 0),
-        xycoords=panel.get_yaxis_transform(),
-        textcoords="offset points",
-        va="center_baseline",
-        size=SMALL,
-        **style,
-    )
+    style |= {"textcoords": "offset points", "va": "center_baseline", "size": SMALL}
+    panel.annotate(text, (x, y), (points, 0), xycoords=panel.get_yaxis_transform(), **style)
 
 
-def label_blocks(
-    panel: Axes,
-    rows: Sequence[tuple[str, str]],
-    y: NDArray[np.float64],
-    *,
-    defaults: Mapping[str, str],
-    labelled: bool = True,
-) -> None:
-    """Shade every other block of rows; name it and its values at the left, defaults in bold."""
-    ids = [id for id, _ in rows]
-    for count, id in enumerate(dict.fromkeys(ids)):
+def shade_blocks(panel: Axes, ids: Sequence[str], y: NDArray[np.float64]) -> None:
+    """Shade every other block of rows."""
+    for id in list(dict.fromkeys(ids))[::2]:
         places = y[[other == id for other in ids]]
-        if count % 2 == 0:
-            panel.axhspan(places[0] - 0.72, places[-1] + 0.72, color="0.96", lw=0, zorder=-1)
-        if labelled:
-            beside(panel, id, 0, places[0], -158)
-            for at, (_, value) in zip(places, (row for row in rows if row[0] == id), strict=True):
-                weight = "bold" if defaults.get(id) == value else "normal"
-                beside(panel, value, 0, at, -4, ha="right", weight=weight)
+        panel.axhspan(places[0] - 0.72, places[-1] + 0.72, color="0.96", lw=0, zorder=-1)
     panel.set_ylim(y[-1] + 0.8, -0.8)
 
 
-# --- legends -------------------------------------------------------------------------------------
+def label_blocks(
+    panel: Axes, rows: Sequence[tuple[str, str]], y: NDArray[np.float64], bold: Sequence[Any] = ()
+) -> None:
+    """Name each block of rows and its values at the left, some pairs of them in bold."""
+    named = set()
+    for at, (id, value) in zip(y, rows, strict=True):
+        if id not in named:
+            beside(panel, id, 0, at, -158)
+        named.add(id)
+        weight = "bold" if (id, value) in bold else "normal"
+        beside(panel, value, 0, at, -4, ha="right", weight=weight)
 
 
 def handle(label: str, mark: str, colour: Any, **style: Any) -> Artist:
@@ -162,17 +144,13 @@ def reading_handles(numbers: pd.DataFrame) -> list[Artist]:
     return [handle(F_LABELS[name], *READING_MARKS[name]) for name in READING_MARKS if name in used]
 
 
-# --- counts in words -----------------------------------------------------------------------------
-
-
 def holding(part: pd.DataFrame) -> str:
     """Say in how many specifications a claim holds."""
-    holds = int((part["outcome"] == HOLDS).sum())
+    holds = (part["outcome"] == HOLDS).sum()
     return f"{holds} of {len(part)} specifications ({100 * holds / len(part):.0f} %)"
 
 
 def counted(part: pd.DataFrame) -> str:
     """Say in how many specifications a claim is open, and in how many reversed."""
-    return ", ".join(
-        f"{name} in {int((part['outcome'] == name).sum())}" for name in (OPEN, REVERSED)
-    )
+    counts = (f"{name} in {(part['outcome'] == name).sum()}" for name in (OPEN, REVERSED))
+    return ", ".join(counts)
