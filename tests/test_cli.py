@@ -19,7 +19,6 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
 from matplotlib.figure import Figure
-from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Fit, Maze, MazeError, cli, demonstrate, files, load_demos, save_demos
 from replication.demos.maze_expert import Expert
@@ -30,6 +29,7 @@ from replication.evidence import claims, specifications
 from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.pipeline import run
+from tests.notebooks import write_notebook
 
 
 def replicate(*words: str | Path) -> Result:
@@ -57,19 +57,15 @@ def refused_late(*words: str | Path) -> str:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project folder with one notebook, `toy`, that writes the table `seen.md`."""
-    cells = [
-        new_code_cell('out = "x"\ntrials = 3\nname = "a"\nseed = 1\njobs = 1'),
-        new_code_cell(
-            "from pathlib import Path\n"
-            "if trials == 0: raise ValueError('no trials')\n"
-            "(Path(out) / 'seen.md').write_text(f'| {trials} | {name!r} | {seed} | {jobs} |')"
-        ),
-    ]
-    cells[0].metadata["tags"] = ["parameters"]
-    node = new_notebook(cells=cells)
-    node.metadata["replication"] = {"data": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
-    (tmp_path / "notebooks").mkdir()
-    nbformat.write(node, tmp_path / "notebooks" / "toy.ipynb")
+    code = (
+        "from pathlib import Path\n"
+        "if trials == 0: raise ValueError('no trials')\n"
+        "(Path(out) / 'seen.md').write_text(f'| {trials} | {name!r} | {seed} | {jobs} |')"
+    )
+    declared = {"data": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
+    parameters = 'out = "x"\ntrials = 3\nname = "a"\nseed = 1\njobs = 1'
+    toy = tmp_path / "notebooks" / "toy.ipynb"
+    write_notebook(toy, code, parameters=parameters, **declared)
     (tmp_path / "environment.lock").touch()
     monkeypatch.setattr(files, "PROJECT", tmp_path)
     return tmp_path
@@ -118,17 +114,13 @@ def test_only_the_paper_as_it_is_goes_to_figures(
 
 def test_tables_are_shown_by_their_names(project: Path) -> None:
     """Each table has its name, with that of its notebook, in the order of the notebooks."""
+    code = (
+        "from pathlib import Path\n"
+        "for name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
+        "    (Path(out) / name).write_text(f'| {name} |\\n')"
+    )
     for name in ("a", "b"):
-        cells = [
-            new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
-            new_code_cell(
-                "from pathlib import Path\n"
-                "for name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
-                f"    (Path(out) / name).write_text('| {name} |\\n')"
-            ),
-        ]
-        node = new_notebook(cells=cells, metadata={"replication": {"tables": ["main", "sets"]}})
-        nbformat.write(node, project / "notebooks" / f"{name}.ipynb")
+        write_notebook(project / "notebooks" / f"{name}.ipynb", code, tables=["main", "sets"])
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
     assert titles == [(f"{n}/{t}.md", n) for n in ("a", "b") for t in ("main", "sets")]
@@ -142,22 +134,17 @@ def test_claims_are_shown_last(
 ) -> None:
     """A run that judges the claims ends with a line for each of them, the verdict first."""
     table = (
-        "id,claim,place,statistic,F,paper,effect,low,high,verdict,why\n"
+        "id,claim,place,statistic,reading,paper,effect,low,high,verdict,why\n"
         "FASTER,It is faster,Table I,mean-difference,printed,-5,-4,-6,-2,reproduced,\n"
         "FASTER,It is faster,Table I,mean-difference,updated,-5,-1,-2,0,undecided,why\n"
         "SD-B,SD,Fig. 6,published-sd,,3,2,1,3,not testable,used\n"
     )
-    cells = [
-        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
-        new_code_cell(
-            "from pathlib import Path\nfolder = Path(out)\n"
-            f"(folder / 'verdicts.csv').write_text({table!r})\n"
-            "(folder / 'verdicts.md').write_text('| long table |\\n')"
-        ),
-    ]
-    declared = {"tables": ["verdicts"]}
-    node = new_notebook(cells=cells, metadata={"replication": declared})
-    nbformat.write(node, project / "notebooks" / "claims.ipynb")
+    code = (
+        "from pathlib import Path\nfolder = Path(out)\n"
+        f"(folder / 'verdicts.csv').write_text({table!r})\n"
+        "(folder / 'verdicts.md').write_text('| long table |\\n')"
+    )
+    write_notebook(project / "notebooks" / "claims.ipynb", code, tables=["verdicts"])
     monkeypatch.chdir(project)
     shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
     assert "long table" not in shown
@@ -237,15 +224,11 @@ def test_values_are_json_or_else_text(text: str, value: object) -> None:
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_interruption_is_one_line(tmp_path: Path, name: str) -> None:
     """Ctrl-C, or a polite kill, ends a run in one line, code 130, and leaves no kernel."""
-    cells = [
-        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
-        new_code_cell(
-            f"import os, pathlib, time\npathlib.Path({str(tmp_path / 'pid')!r})"
-            ".write_text(f'{os.getpid()}\\n')\ntime.sleep(300)"
-        ),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {}})
-    nbformat.write(node, tmp_path / "sleep.ipynb")
+    code = (
+        f"import os, pathlib, time\npathlib.Path({str(tmp_path / 'pid')!r})"
+        ".write_text(f'{os.getpid()}\\n')\ntime.sleep(300)"
+    )
+    write_notebook(tmp_path / "sleep.ipynb", code)
     (tmp_path / "environment.lock").touch()
     scratch = tmp_path / "scratch"
     scratch.mkdir()

@@ -8,16 +8,17 @@ from __future__ import annotations
 import base64
 import json
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from replication.errors import unknown
 from replication.files import write_file
+from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive
 from replication.pipeline.index import shown_outputs, write_index
 from replication.pipeline.manifest import damaged, hashes, published_folders, save_manifest
-from replication.pipeline.notebook import EXECUTED, NotebookError, first_line
+from replication.pipeline.notebook import NotebookError, first_line
 from replication.pipeline.publish import draft_folder, swap
 
 Draw = Callable[[str, Path], Mapping[str, bytes]]
@@ -53,28 +54,19 @@ def redraw(
             for shown, _ in shown_outputs(out / notebook)
             if shown.get("kind") == "figure" and "code" in shown
         }
+        called = {key: {*key, "/".join(key)} for key in figures}
+        known = sorted(set().union(*called.values()))
         for name in names:
-            known = {*(f"{n}/{figure}" for n, figure in figures), *_parts(figures)}
             if name not in known:
-                raise NotebookError(unknown(name, sorted(known), "figure"))
-        number = 0
+                raise NotebookError(unknown(name, known, "figure"))
+        chosen = [key for key in figures if not names or called[key] & {*names}]
         for notebook, manifest in manifests.items():
-            chosen = {
-                figure: code
-                for (owner, figure), code in figures.items()
-                if owner == notebook
-                and (not names or {owner, figure, f"{owner}/{figure}"} & {*names})
-            }
-            number += len(chosen)
-            changed = _redraw_folder(out / notebook, manifest, chosen, draw)
-            for figure in changed:
+            codes = {key[1]: figures[key] for key in chosen if key[0] == notebook}
+            for figure in _redraw_folder(out / notebook, manifest, codes, draw):
                 echo(f"{notebook}/{figure}: redrawn, other bytes than before")
         write_index(out)
+        number = len(chosen)
         echo(f"{number} figure{'s' * (number != 1)} drawn; the others have the same bytes")
-
-
-def _parts(figures: Iterable[tuple[str, str]]) -> set[str]:
-    return {part for figure in figures for part in figure}
 
 
 def _redraw_folder(
@@ -85,9 +77,8 @@ def _redraw_folder(
     drawn: dict[str, bytes] = {}
     for figure, code in figures.items():
         table = f"{figure}.csv"
-        if table in lost or EXECUTED in lost:
-            file, how = (table, lost[table]) if table in lost else (EXECUTED, lost[EXECUTED])
-            message = f"is {how} since its run; first: replicate run {folder.name}"
+        for file in {table, EXECUTED} & lost.keys():
+            message = f"is {lost[file]} since its run; first: replicate run {folder.name}"
             raise NotebookError(f"{folder / file}: {message}")
         try:
             pictures = draw(code, folder / table)

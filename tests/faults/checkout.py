@@ -19,13 +19,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import nbformat
-from nbformat.v4 import new_code_cell, new_notebook
-
 from replication import demonstrate, save_demos
 from replication.envs.maze import Maze
 from replication.files import PROJECT
 from replication.pipeline.manifest import RUNS
+from tests.notebooks import write_notebook
 
 TASKS, TRIALS = 12, 3
 """The toy notebook's trials: so many tasks, each a chunk of so many trials."""
@@ -88,12 +86,8 @@ SMALL = "\n".join((".......", ".....G.", "...#...", ".......", ".S.....", ".....
 
 def notebook(path: Path, *cells: str, data: list[str], parameters: str = PARAMETERS) -> None:
     """Write a notebook."""
-    nodes = [new_code_cell(parameters), *(new_code_cell(cell.strip()) for cell in cells)]
-    nodes[0].metadata["tags"] = ["parameters"]
-    for number, node in enumerate(nodes):
-        node["id"] = f"cell-{number}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    nbformat.write(new_notebook(cells=nodes, metadata={"replication": {"data": data}}), path)
+    sources = [cell.strip() for cell in cells]
+    write_notebook(path, *sources, parameters=parameters, data=data)
 
 
 # Compiles what the toy notebook needs, so that no test waits for it.

@@ -13,9 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Demos
 from replication.files import PROJECT
@@ -27,6 +25,7 @@ from replication.trials.results import Results
 from replication.trials.run import WorkerError, run_trials
 from replication.trials.store import Store
 from tests.faults.checkout import Checkout, Reference, gone, listening, wait
+from tests.notebooks import write_notebook
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -152,27 +151,23 @@ def test_a_notebook_runs_on_a_cluster(
     small_demos: Demos, tmp_path: Path, start: StartCluster
 ) -> None:
     """`replicate run --scheduler` sends a notebook's trials there."""
-    cells = [
-        new_code_cell('out = "x"\nseed = 5', metadata={"tags": ["parameters"]}, id="a"),
-        new_code_cell(
-            "import os\nfrom pathlib import Path\n"
-            "from replication import Maze, demonstrate\n"
-            "from replication.paper.params import Params\n"
-            "from replication.trials.condition import Condition\n"
-            "from replication.trials.run import run_trials\n"
-            "from replication.trials.store import Store\n"
-            "maze = Maze.from_text('....G\\n.#...\\nS....')\n"
-            "params = Params.of(episodes=60, horizon=40, max_iterations=40)\n"
-            "condition = Condition(demonstrate('small', maze), 'unified', params)\n"
-            "store = Store(Path(out).parent.parent / 'trials.sqlite')\n"
-            "results = run_trials([condition], trials=3, store=store, seed=seed)\n"
-            "(Path(out) / 'curves.txt').write_text(results.errors(condition).tobytes().hex())",
-            id="b",
-        ),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {"data": ["curves.txt"]}})
+    code = """
+import os
+from pathlib import Path
+from replication import Maze, demonstrate
+from replication.paper.params import Params
+from replication.trials.condition import Condition
+from replication.trials.run import run_trials
+from replication.trials.store import Store
+maze = Maze.from_text('....G\\n.#...\\nS....')
+params = Params.of(episodes=60, horizon=40, max_iterations=40)
+condition = Condition(demonstrate('small', maze), 'unified', params)
+store = Store(Path(out).parent.parent / 'trials.sqlite')
+results = run_trials([condition], trials=3, store=store, seed=seed)
+(Path(out) / 'curves.txt').write_text(results.errors(condition).tobytes().hex())
+"""
     path = tmp_path / "toy.ipynb"
-    nbformat.write(node, path)
+    write_notebook(path, code, parameters='out = "x"\nseed = 5', data=["curves.txt"])
     address = start().address
     found = []
     for words in ([], ["--scheduler", address]):

@@ -11,7 +11,7 @@ from typing import Any
 import nbformat
 import papermill
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat.v4 import new_markdown_cell
 
 from replication import files
 from replication.pipeline import driver
@@ -19,6 +19,7 @@ from replication.pipeline.execute import KERNEL, execute
 from replication.pipeline.notebook import NotebookError, RunError, read_notebook
 from replication.pipeline.rendering import rendered
 from replication.progress import Display
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nname = "a"\njobs = 1\nstore = "build/s"\nout = "build"'
 CODE = """
@@ -44,14 +45,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def write(project: Path, *code: str, prose: str = "# Toy") -> Any:
     """Write the notebook: a headline, the parameters and code cells; return its contents."""
-    cells = [
-        new_markdown_cell(prose, id="head"),
-        new_code_cell(PARAMETERS, id="parameters", metadata={"tags": ["parameters"]}),
-        *(new_code_cell(source, id=f"code-{at}") for at, source in enumerate(code)),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {}})
-    nbformat.write(node, project / "toy.ipynb")
-    return node
+    return write_notebook(project / "toy.ipynb", *code, parameters=PARAMETERS, prose=prose)
 
 
 @pytest.fixture

@@ -5,14 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import inputs as inputs_module
 from replication.pipeline.inputs import Inputs, changes
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\ndemos = "demos.json"\njobs = 1\nstore = "s"\nout = "build"'
 CODE = "from replication.learning.seeds import trial_seeds\nvalue = trials  # as given"
@@ -35,19 +34,11 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def write(project: Path) -> Write:
     """Write a notebook and read it: a headline, the parameters and code cells."""
 
-    def write(
-        *code: str,
-        name: str = "toy",
-        parameters: str = PARAMETERS,
-        prose: str = "# Toy",
-        **declared: Any,
-    ) -> Notebook:
-        cells = [new_markdown_cell(prose), new_code_cell(parameters)]
-        cells[1].metadata["tags"] = ["parameters"]
-        cells += [new_code_cell(source) for source in code or (CODE,)]
-        metadata = {"replication": {"data": ["a.csv"], "inputs": ["choices.toml"]} | declared}
-        nbformat.write(new_notebook(cells=cells, metadata=metadata), project / f"{name}.ipynb")
-        return read_notebook(project / f"{name}.ipynb")
+    def write(*code: str, **given: Any) -> Notebook:
+        declared = {"data": ["a.csv"], "inputs": ["choices.toml"]}
+        given = {"parameters": PARAMETERS, "prose": "# Toy"} | declared | given
+        write_notebook(project / "toy.ipynb", *code or (CODE,), **given)
+        return read_notebook(project / "toy.ipynb")
 
     return write
 

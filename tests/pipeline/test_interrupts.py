@@ -7,9 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook
+
+from tests.notebooks import write_notebook
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 
@@ -36,16 +36,8 @@ def marked(mark: Path) -> list[int]:
 
 def interrupted(project: Path, seconds: float, *, starting: bool) -> None:
     """Interrupt a run some seconds after its cell or driver has begun; check how it ends."""
-    cells = [
-        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
-        new_code_cell(
-            f"import time\nfrom pathlib import Path\nPath({str(project / 'begun')!r}).touch()\n"
-            "time.sleep(300)"
-        ),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {}})
-    project.mkdir()
-    nbformat.write(node, project / "sleep.ipynb")
+    begin = f"from pathlib import Path\nPath({str(project / 'begun')!r}).touch()"
+    write_notebook(project / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(300)")
     (project / "environment.lock").touch()
     scratch = project / "scratch"
     scratch.mkdir()

@@ -7,17 +7,17 @@ import threading
 import time
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import status
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.manifest import RUNS
-from replication.pipeline.notebook import MANIFEST, NotebookError
+from replication.pipeline.notebook import NotebookError
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import run_notebooks
 from replication.pipeline.status import clean, status_lines
+from tests.notebooks import write_notebook
 
 
 @pytest.fixture
@@ -28,11 +28,9 @@ def project(toy_project: Path) -> Path:
 
 def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "# Maze") -> Path:
     """Write a notebook with a figure, a table and a file of data."""
-    parameters = new_code_cell('trials = 3\nout = "x"', metadata={"tags": ["parameters"]})
-    cells = [new_markdown_cell(prose), parameters, new_code_cell(code)]
     declared = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
-    node = new_notebook(cells=cells, metadata={"replication": declared})
-    nbformat.write(node, project / f"{name}.ipynb")
+    given = {"parameters": 'trials = 3\nout = "x"', "prose": prose} | declared
+    write_notebook(project / f"{name}.ipynb", code, **given)
     return project / f"{name}.ipynb"
 
 
