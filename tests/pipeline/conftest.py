@@ -1,16 +1,14 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
 
 from replication import files
 from replication.pipeline import execute as execution
-from replication.pipeline.notebook import Notebook
 from replication.pipeline.run import Published, run_notebooks
 from tests.notebooks import write_notebook
 
@@ -60,27 +58,6 @@ def run(project: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
             assert not list(out.glob(".draft-*")) + list(out.glob(".aside-*"))
 
     return run
-
-
-@pytest.fixture
-def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Run notebooks in this process, which is fast; return the names of those that began."""
-    begun: list[str] = []
-
-    def execute(notebook: Notebook, values: Mapping[str, Any], stage: Path, **_: Any) -> str:
-        begun.append(notebook.name)
-        names: dict[str, Any] = {}
-        node = notebook.load()
-        for at, cell in enumerate(node.cells):
-            if cell.cell_type == "code":
-                cell.execution_count = at
-                exec(cell.source, names)
-            if at == notebook.at:
-                names |= {**values, "out": str(stage)}
-        return str(nbformat.writes(node)) + "\n"
-
-    monkeypatch.setattr(execution, "execute", execute)
-    return begun
 
 
 @pytest.fixture

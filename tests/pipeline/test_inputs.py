@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -154,9 +155,13 @@ def test_code_that_python_cannot_read_has_inputs(write: Write) -> None:
 def test_cells_are_told_apart(write: Write) -> None:
     """The same lines in other cells are other code, since each cell has outputs of its own."""
     whole = "x = 1\n\n\ndef f(): pass"
-    assert changes(
-        known(inputs_of(write(whole), {})), inputs_of(write(*whole.split("\n\n\n")), {})
-    ) == ["the notebook's code has changed"]
+    before = known(inputs_of(write(whole), {}))
+    notebook = write(*whole.split("\n\n\n"))
+    assert changes(before, inputs_of(notebook, {})) == ["the notebook's code has changed"]
+    before = known(inputs_of(notebook, {}))
+    text, parameters, first, second = notebook.cells
+    moved = replace(notebook, cells=(text, first, parameters, second), at=2)
+    assert changes(before, inputs_of(moved, {})) == ["the notebook's code has changed"]
 
 
 def test_any_file_that_a_parameter_names_counts(write: Write, project: Path) -> None:

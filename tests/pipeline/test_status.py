@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import datetime
 import fcntl
-import json
 import threading
 import time
 from pathlib import Path
@@ -12,7 +11,6 @@ import pytest
 from replication import files
 from replication.pipeline import status
 from replication.pipeline.declaration import MANIFEST
-from replication.pipeline.manifest import RUNS
 from replication.pipeline.notebook import NotebookError
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import run_notebooks
@@ -51,8 +49,8 @@ def lines(project: Path, *names: str) -> list[str]:
     return status_lines(prepared(project, *names or ("maze",)), project / "figures")
 
 
-def test_before_the_first_run_everything_is_missing(project: Path) -> None:
-    """There need be no folder; the last line says what to do."""
+def test_what_is_missing_is_fresh_after_a_run(project: Path) -> None:
+    """Each figure and table has a line, its notebook one with run time and age."""
     write(project)
     assert lines(project) == [
         "maze: missing",
@@ -62,11 +60,6 @@ def test_before_the_first_run_everything_is_missing(project: Path) -> None:
         "",
         "to bring figures up to date: replicate run maze",
     ]
-
-
-def test_after_a_run_everything_is_fresh(project: Path) -> None:
-    """Each figure and table is fresh, with run time and age of its notebook."""
-    write(project)
     run(project, "maze")
     assert lines(project) == [
         "maze: fresh (0 s, just now)",
@@ -94,14 +87,6 @@ def test_what_is_stale_has_its_reasons(project: Path) -> None:
     assert found[-1] == "to bring figures up to date: replicate run maze"
 
 
-def test_prose_alone_is_no_reason_to_execute(project: Path) -> None:
-    """New text leaves everything fresh."""
-    write(project)
-    run(project, "maze")
-    write(project, prose="# Labyrinth")
-    assert lines(project)[-1] == "everything is fresh; replicate verify proves it"
-
-
 def test_damaged_outputs_are_told_apart(project: Path) -> None:
     """A file that was deleted or edited has its own state, and is the reason."""
     write(project)
@@ -115,17 +100,6 @@ def test_damaged_outputs_are_told_apart(project: Path) -> None:
         "    changed  fig .csv .png .svg",
         "    missing  table .csv .md",
     ]
-
-
-def test_outputs_without_a_record_are_stale(project: Path) -> None:
-    """Files that nobody knows how they were made are never called fresh."""
-    write(project)
-    run(project, "maze")
-    (project / "figures" / "maze" / "provenance.json").write_text("{")
-    assert lines(project)[1] == "    because there is no record of how they were made"
-    run(project, "maze")
-    (project / "figures" / "maze" / "notebook.ipynb").unlink()
-    assert lines(project)[1] == "    because notebook.ipynb is missing"
 
 
 def test_notebooks_have_states_of_their_own(project: Path) -> None:
@@ -166,31 +140,10 @@ def test_many_reasons_are_cut_short(project: Path) -> None:
         (49 * 3600, "2 days ago"),
     ],
 )
-def test_age_is_never_negative(project: Path, seconds: float, age: str) -> None:
+def test_age_is_never_negative(seconds: float, age: str) -> None:
     """However the clock was set, the age of a run reads well."""
-    write(project)
-    run(project, "maze")
-    file = project / "figures" / RUNS
-    runs = json.loads(file.read_text())
     then = datetime.datetime.now(datetime.UTC) - datetime.timedelta(seconds=seconds)
-    runs["maze"] |= {"finished": then.isoformat(), "seconds": 754.4}
-    file.write_text(json.dumps(runs))
-    assert lines(project)[0] == f"maze: fresh (754 s, {age})"
-
-
-def test_the_commands_have_the_options_of_the_question(project: Path) -> None:
-    """What is recommended for other outputs than the default ones names these."""
-    write(project)
-    runs = prepared(project, "maze")
-    options = ["--profile", "quick", "--out", "my figures"]
-    found = status_lines(runs, project / "figures", options)
-    command = "replicate run maze --profile quick --out 'my figures'"
-    assert found[-1] == f"to bring figures up to date: {command}"
-    run(project, "maze")
-    runs = prepared(project, "maze")
-    found = status_lines(runs, project / "figures", options)
-    command = "replicate verify --profile quick --out 'my figures'"
-    assert found[-1] == f"everything is fresh; {command} proves it"
+    assert status._age(then.isoformat()) == age
 
 
 def test_a_notebook_that_is_gone_is_named(project: Path) -> None:
