@@ -112,12 +112,12 @@ def test_only_the_paper_as_it_is_goes_to_figures(
 
 def test_tables_are_shown_by_their_names(project: Path) -> None:
     """Each table has its name, with that of its notebook, in the order of the notebooks."""
-    code = (
-        "from pathlib import Path\n"
-        "for name in ['main.csv', 'main.md', 'sets.csv', 'sets.md']:\n"
-        "    (Path(out) / name).write_text(f'| {name} |\\n')"
-    )
+    names = ["main.csv", "main.md", "sets.csv", "sets.md"]
     for name in ("a", "b"):
+        code = (
+            "from pathlib import Path\n"
+            f"[(Path(out) / file).write_text('| {name} |\\n') for file in {names}]"
+        )
         write_notebook(project / "notebooks" / f"{name}.ipynb", code, tables=["main", "sets"])
     shown = replicate("run", "a", "b").stdout
     titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)

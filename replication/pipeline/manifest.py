@@ -13,7 +13,7 @@ import json
 import platform
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -122,10 +122,17 @@ def output_hash(path: Path) -> str:
     return text_hash(json.dumps(given, sort_keys=True))
 
 
-def damaged(folder: Path, manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Return the outputs in a manifest that are "missing" or "changed" since the run, by name."""
+def damaged(
+    folder: Path, manifest: Mapping[str, Any], names: Collection[str] | None = None
+) -> dict[str, str]:
+    """Return those of all or some outputs that are "missing" or "changed" since the run, by name.
+
+    An output that the manifest does not know is no output.
+    """
     lost = {}
     for name, expected in manifest["outputs"].items():
+        if names is not None and name not in names:
+            continue
         if not (folder / name).is_file():
             lost[name] = "missing"
         elif output_hash(folder / name) != expected:

@@ -28,18 +28,10 @@ Draw = Callable[[str, Path], Mapping[str, bytes]]
 def redraw(
     out: Path, names: Sequence[str], *, draw: Draw, echo: Callable[[str], object] = print
 ) -> None:
-    """Redraw figures; say which have changed.
+    """Redraw figures in the notebooks' folders in `out`; say which have changed.
 
-    Parameters
-    ----------
-    out
-        The folder that holds the notebooks' folders.
-    names
-        Figures (`fig05`, or `open_maze/fig05`) or notebooks; all figures if empty.
-    draw
-        Draws one figure.
-    echo
-        Prints a line.
+    `names` are those of figures (`fig05`, or `open_maze/fig05`) or notebooks; if empty, all
+    figures are drawn.
 
     Raises
     ------
@@ -48,6 +40,8 @@ def redraw(
     """
     with exclusive(out, echo):
         manifests = published_folders(out)
+        for notebook, manifest in manifests.items():
+            _check_whole(out / notebook, manifest, EXECUTED)
         figures = {
             (notebook, shown["name"]): shown["code"]
             for notebook in manifests
@@ -73,13 +67,10 @@ def _redraw_folder(
     folder: Path, manifest: dict[str, Any], figures: Mapping[str, str], draw: Draw
 ) -> list[str]:
     """Redraw figures of one folder, which is replaced as a whole; return those that changed."""
-    lost = damaged(folder, manifest)
     drawn: dict[str, bytes] = {}
     for figure, code in figures.items():
         table = f"{figure}.csv"
-        for file in {table, EXECUTED} & lost.keys():
-            message = f"is {lost[file]} since its run; first: replicate run {folder.name}"
-            raise NotebookError(f"{folder / file}: {message}")
+        _check_whole(folder, manifest, table)
         try:
             pictures = draw(code, folder / table)
         except Exception as error:  # whatever other code makes of the table
@@ -102,6 +93,12 @@ def _redraw_folder(
         save_manifest(draft, manifest | {"outputs": outputs})
         swap(draft, folder)
     return sorted({name.rpartition(".")[0] for name in new})
+
+
+def _check_whole(folder: Path, manifest: Mapping[str, Any], file: str) -> None:
+    if how := damaged(folder, manifest, (file,)).get(file):
+        message = f"is {how} since its run; first: replicate run {folder.name}"
+        raise NotebookError(f"{folder / file}: {message}")
 
 
 def _embedded(notebook: Path, drawn: Mapping[str, bytes]) -> str:

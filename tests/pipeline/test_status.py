@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import datetime
 import fcntl
+import re
 import threading
 import time
 from pathlib import Path
@@ -45,8 +46,9 @@ def prepared(project: Path, *names: str) -> list[Run]:
 
 
 def lines(project: Path, *names: str) -> list[str]:
-    """Return the status of notebooks."""
-    return status_lines(prepared(project, *names or ("maze",)), project / "figures")
+    """Return the status of notebooks, as if their runs had taken no time."""
+    lines = status_lines(prepared(project, *names or ("maze",)), project / "figures")
+    return [re.sub(r"\(\d+ s,", "(0 s,", line) for line in lines]
 
 
 def test_what_is_missing_is_fresh_after_a_run(project: Path) -> None:
