@@ -64,14 +64,14 @@ def test_players_are_links(executed: Path) -> None:
 
 def test_what_differs_between_equal_runs_goes(tmp_path: Path) -> None:
     """New cells, and those of a format without ids, have ids by their places; no time is left."""
-    document = new_notebook(cells=[parameters()], metadata={"replication": {}}, nbformat_minor=4)
+    document = new_notebook(cells=[parameters()], metadata={"replication": {}})
+    document.nbformat_minor = 4
     del document.cells[0]["id"]
     (tmp_path / "source.ipynb").write_text(json.dumps(document))
     source = read_notebook(tmp_path / "source.ipynb")
 
     def run() -> str:
-        node = source.load()  # with random ids
-        node.nbformat_minor = 5
+        node = nbformat.v4.upgrade(source.load())  # which makes random ids
         node.cells.append(new_code_cell("1", metadata={"papermill": {"duration": 1}, "tags": []}))
         node.metadata["papermill"] = {"start_time": 1}
         return as_text(clean(source, node))
