@@ -32,10 +32,10 @@ quick: $(VENV)/.ready ## the paper with few trials, into build/quick
 	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --profile quick --out build/quick
 
 test: $(VENV)/.ready ## run the tests
-	$(RUN) -m pytest
+	$(RUN) -m pytest -n 2
 
 test-all: $(VENV)/.ready ## run also those that take minutes: a hundred kills, ten thousand files
-	$(RUN) -m pytest -m "long or not long"
+	$(RUN) -m pytest -n 2 -m "long or not long"
 
 bench: $(VENV)/.ready ## measure speed
 	$(RUN) -m pytest benchmarks -s

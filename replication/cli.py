@@ -2,6 +2,7 @@
 
 A mistake of the user is one line on stderr and exit code 2; a run that fails has exit code 1, an
 interrupted one 130. Modules that take long to import are imported by the commands that need them.
+One file because the commands are one surface: they share options, errors and signals.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from itertools import zip_longest
 from pathlib import Path
@@ -38,19 +40,13 @@ GRACE = 5.0
 class OneLineErrors(click.Group):
     """Reports a user's mistake in one line; a fault of the program keeps its traceback."""
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        **extra: Any,
-    ) -> Any:
+    def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
         """Run the command, and end with its exit code unless told otherwise."""
+        command = partial(super().main, *args, standalone_mode=False, **extra)
         if not standalone_mode:
-            return super().main(args, prog_name, complete_var, False, **extra)
+            return command()
         try:
-            code = super().main(args, prog_name, complete_var, False, **extra)
+            code: Any = command()
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.message)
             sys.exit(2)
@@ -119,26 +115,27 @@ def number(name: str, least: int | None, text: str, **more: Any) -> Callable[...
 
 def folder(text: str, default: Path | None = None) -> Callable[..., Any]:
     """Return the option --out."""
-    shown = default is not None
-    return click.option(
-        "--out", type=FILE, default=default, show_default=shown, metavar="FOLDER", help=text
-    )
+    return click.option("--out", type=FILE, default=default, metavar="FOLDER", help=text)
 
 
-def profile_option(text: str = "The profile that the outputs belong to.") -> Callable[..., Any]:
-    """Return the option --profile."""
-    names = click.Choice(["quick", "paper"])
-    return click.option("--profile", type=names, default="paper", show_default=True, help=text)
-
-
-out_option = folder("The outputs.")
 jobs_option = number("--jobs", 1, "Worker processes; one for each usable core by default.")
+profile_option = click.option(
+    "--profile",
+    type=click.Choice(["quick", "paper"]),
+    default="paper",
+    help="The paper's number of trials, or a few.",
+)
+
+
+def outputs_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Let --profile and --out choose published outputs."""
+    return profile_option(folder("The outputs.")(command))
 
 
 @click.group(
     "replicate",
     cls=OneLineErrors,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     help="Inverse reinforcement learning from correct and incorrect demonstrations, replicated.",
 )
 @click.version_option(
@@ -158,16 +155,11 @@ def demos_group() -> None:
 
 @app.command(epilog="Example: replicate run open_maze --profile quick -p set_trials 4")
 @click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
-@profile_option("The paper's number of trials, or a few.")
+@profile_option
 @jobs_option
 @number("--seed", 0, "Root seed; the notebook's by default.")
 @folder("Where the outputs go.")
-@number(
-    *("--timeout", 1, "Time that one cell may take."),
-    default=3600,
-    show_default=True,
-    metavar="SECONDS",
-)
+@number("--timeout", 1, "Time that one cell may take.", default=3600, metavar="SECONDS")
 @click.option("--force", is_flag=True, help="Re-run everything, and recompute every trial.")
 @click.option(
     "--here", is_flag=True, help="Also re-run notebooks whose outputs were made on another machine."
@@ -176,6 +168,7 @@ def demos_group() -> None:
 @click.option(
     "--scheduler",
     default="",
+    show_default=False,
     metavar="ADDRESS",
     help="Send trials to a Dask scheduler: tcp://HOST:PORT.",
 )
@@ -273,8 +266,7 @@ def _example(message: str, parameters: Mapping[str, Any]) -> str:
 
 @app.command(epilog="Example: replicate draw fig05")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@profile_option()
-@out_option
+@outputs_options
 def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
     """Redraw figures, all by default, from the tables beside them; nothing is executed.
 
@@ -301,24 +293,18 @@ def _drawn(code: str, table: Path) -> dict[str, bytes]:
 
 
 @app.command(epilog="Example: replicate status")
-@profile_option()
-@out_option
+@outputs_options
 def status(profile: str, out: Path | None) -> None:
     """Show which figures and tables are up to date, why others are not, and what to do."""
-    from replication.pipeline.folders import outputs_folder
-    from replication.pipeline.plan import prepare
     from replication.pipeline.status import status_lines
 
-    target = out or outputs_folder(profile)
     options = ["--profile", profile] if profile != "paper" else []
     options += ["--out", str(out)] if out else []
-    runs = prepare(_all_notebooks(), profile=profile, out=target)
-    click.echo("\n".join(status_lines(runs, target, options)))
+    click.echo("\n".join(status_lines(*_prepared(profile, out), options)))
 
 
 @app.command(epilog="Example: replicate verify")
-@profile_option()
-@out_option
+@outputs_options
 @jobs_option
 def verify(profile: str, out: Path | None, jobs: int | None) -> None:
     """Prove the outputs: hash the files, check the packages, recompute one trial in twenty.
@@ -338,14 +324,12 @@ def verify(profile: str, out: Path | None, jobs: int | None) -> None:
 def _disagreements(profile: str, out: Path | None, jobs: int) -> Iterator[str]:
     """Check everything; say what is being done, and yield what is wrong."""
     from replication.evidence.recompute import EVERY, recompute_trials
-    from replication.pipeline.folders import outputs_folder
-    from replication.pipeline.plan import prepare
     from replication.pipeline.verify import verify_inputs, verify_outputs, verify_packages
 
-    target = out or outputs_folder(profile)
+    runs, target = _prepared(profile, out)
     click.echo(f"hashing the outputs in {target.name} and what they depend on")
     yield from verify_outputs(target)
-    yield from verify_inputs(prepare(_all_notebooks(), profile=profile, out=target), target)
+    yield from verify_inputs(runs, target)
     click.echo("comparing the installed packages with environment.lock")
     yield from verify_packages(files.PROJECT / "environment.lock")
 
@@ -358,18 +342,13 @@ def _disagreements(profile: str, out: Path | None, jobs: int) -> Iterator[str]:
 
 
 @app.command(epilog="Example: replicate clean --dry-run")
-@profile_option()
-@out_option
+@outputs_options
 @click.option("--dry-run", is_flag=True, help="Only show what would be removed.")
 def clean(profile: str, out: Path | None, dry_run: bool) -> None:
     """Remove outputs that no notebook declares any more."""
     from replication.pipeline import status
-    from replication.pipeline.folders import outputs_folder
-    from replication.pipeline.plan import prepare
 
-    target = out or outputs_folder(profile)
-    runs = prepare(_all_notebooks(), profile=profile, out=target)
-    status.clean(runs, target, dry_run=dry_run, echo=click.echo)
+    status.clean(*_prepared(profile, out), dry_run=dry_run, echo=click.echo)
 
 
 @app.command(epilog="Example: replicate site")
@@ -390,7 +369,6 @@ def site(out: Path) -> None:
 @click.option(
     "--method",
     default="unified-incorrect",
-    show_default=True,
     metavar="METHOD",
     help="adaboost, unified or unified-incorrect.",
 )
@@ -534,15 +512,9 @@ def choices(id: str | None) -> None:
     width = shutil.get_terminal_size().columns
     if id is None:
         rows = [("ID", "DEFAULT", "ALTERNATIVES", "FIELD, DATA OR CODE")]
-        rows += [
-            (
-                entry.id,
-                str(entry.default),
-                _accepted(entry),
-                entry.field or entry.data or entry.code,
-            )
-            for entry in entries.values()
-        ]
+        for entry in entries.values():
+            place = entry.field or entry.data or entry.code
+            rows.append((entry.id, str(entry.default), _accepted(entry), place))
         _print_table(rows, width)
         return
     if id.upper() not in entries:
@@ -576,25 +548,33 @@ def _print_table(rows: Sequence[tuple[str, ...]], width: int) -> None:
 # --- what the commands share -----------------------------------------------------------------
 
 
+def _prepared(profile: str, out: Path | None) -> tuple[list[Any], Path]:
+    """Return the runs of all notebooks, and the folder of their outputs."""
+    from replication.pipeline.folders import outputs_folder
+    from replication.pipeline.plan import prepare
+
+    target = out or outputs_folder(profile)
+    return prepare(_all_notebooks(), profile=profile, out=target), target
+
+
 def _notebook(name: str) -> Path:
     """Find a notebook by its name or path."""
-    path = Path(name)
-    if path.suffix == ".ipynb" or len(path.parts) > 1:
-        found = files.resolve(path)
-        if not found.exists():
+    if name.endswith(".ipynb") or len(Path(name).parts) > 1:
+        path = files.resolve(name)
+        if not path.exists():
             raise UserError(f"there is no notebook {name}")
-        return found
-    known = [path.stem for path in _all_notebooks()]
-    if name not in known:
-        raise UserError(unknown(name, known, "notebook"))
-    return files.PROJECT / "notebooks" / f"{name}.ipynb"
+        return path
+    notebooks = {path.stem: path for path in _all_notebooks()}
+    if name not in notebooks:
+        raise UserError(unknown(name, notebooks, "notebook"))
+    return notebooks[name]
 
 
 def _all_notebooks() -> list[Path]:
-    found = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
-    if not found:
+    paths = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
+    if not paths:
         raise UserError(f"there is no notebook in {files.PROJECT / 'notebooks'}")
-    return found
+    return paths
 
 
 def _short(path: Path) -> str:

@@ -55,6 +55,27 @@ def toy_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Run notebooks in this process, which is fast; return the names of those that began."""
+    begun: list[str] = []
+
+    def execute(notebook: Notebook, values: Any, stage: Path, **_: Any) -> str:
+        begun.append(notebook.name)
+        names: dict[str, Any] = {}
+        node = notebook.load()
+        for at, cell in enumerate(node.cells):
+            if cell.cell_type == "code":
+                cell.execution_count = at
+                exec(cell.source, names)
+            if at == notebook.at:
+                names |= {**values, "out": str(stage)}
+        return str(nbformat.writes(node)) + "\n"
+
+    monkeypatch.setattr(execution, "execute", execute)
+    return begun
+
+
+@pytest.fixture
 def store_path(tmp_path: Path) -> Path:
     """Name a place for a store that does not exist yet."""
     return tmp_path / "store" / "trials.sqlite"

@@ -102,3 +102,13 @@ def test_paths_are_shown_from_the_project_on(
     monkeypatch.setattr(files, "PROJECT", tmp_path / "project")
     assert shown_as(tmp_path / "project" / "build" / "quick") == "build/quick"
     assert shown_as(tmp_path / "project" / ".." / "elsewhere") == "elsewhere"
+
+
+def test_paths_prefer_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file here wins over one in the project; an absolute path stays as it is."""
+    monkeypatch.chdir(tmp_path)
+    name = "data/demos/open_maze.json"
+    assert files.resolve(name) == files.PROJECT / name
+    write_file(tmp_path / name, "")
+    assert files.resolve(name) == tmp_path / name
+    assert files.resolve(tmp_path / "none") == tmp_path / "none"

@@ -54,12 +54,10 @@ def execute(
         Folders of this machine, and those that the executed notebook names instead.
     failed
         File for the notebook if it fails.
-    timeout
-        Seconds that one cell may take.
+    timeout, scheduler
+        Those of :func:`run.run_notebooks`.
     display
         Shows the progress of trials.
-    scheduler
-        Address of a Dask scheduler that trials are sent to; none if it is empty.
 
     Raises
     ------
@@ -92,13 +90,10 @@ def execute(
             _raise_faults(notebook, node, scratch, timeout)
         except (UserError, RunError):
             if node is not None:
-                clean(notebook, node)
                 with suppress(OSError):  # on a full disk the failure itself counts
-                    write_file(failed, as_text(node))
+                    write_file(failed, as_text(clean(notebook, node)))
             raise
-        clean(notebook, node)
-        link_players(node)
-        return as_text(node)
+        return as_text(link_players(clean(notebook, node)))
 
 
 def _environment(scratch: Path, scheduler: str) -> dict[str, str]:
@@ -180,16 +175,16 @@ def _raise_faults(notebook: Notebook, node: Any, scratch: Path, timeout: int) ->
 
     if (scratch / "fault.json").exists():
         fault = json.loads((scratch / "fault.json").read_text(encoding="utf-8"))
+        words = first_line(fault["message"])
+        if fault["kind"] == "driver":
+            raise RunError(f"{notebook.path}: its process failed: {words}")
         if fault["cell"] is None:
-            what = (
-                "its process failed" if fault["kind"] == "driver" else "the kernel does not start"
-            )
-            raise RunError(f"{notebook.path}: {what}: {first_line(fault['message'])}")
-        message = f": {first_line(fault['message'])}"
-        if fault["kind"] == "DeadKernelError":
-            message = ": the kernel was killed, perhaps for want of memory; use fewer --jobs"
-        elif fault["kind"] == "CellTimeoutError":
-            message = f" took more than {timeout} seconds; allow more with --timeout"
+            raise RunError(f"{notebook.path}: the kernel does not start: {words}")
+        message = {
+            "DeadKernelError": ": the kernel was killed, perhaps for want of memory; "
+            "use fewer --jobs",
+            "CellTimeoutError": f" took more than {timeout} seconds; allow more with --timeout",
+        }.get(fault["kind"], f": {words}")
         raise RunError(f"{place(fault['cell'])}{message}")
     if node is None:
         raise RunError(f"{notebook.path}: the executed notebook cannot be read")

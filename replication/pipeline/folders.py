@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from replication import files
-from replication.pipeline.notebook import refuse
+from replication.pipeline.notebook import NotebookError, refuse
 from replication.pipeline.publish import recover
 
 LOCK = ".lock"
@@ -32,6 +32,15 @@ def store_file(store: str, out: Path) -> Path:
     """Return the store's file: in `out` where the project cannot be written."""
     path = files.resolve(store)
     return writable(path.parent, out.resolve()) / path.name
+
+
+def check_profile(out: Path, departures: Sequence[str]) -> None:
+    """Refuse results that are not the paper's in the folder of the paper's results."""
+    if departures and out.resolve().is_relative_to((files.PROJECT / PAPER).resolve()):
+        raise NotebookError(
+            f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
+            f"for a run with {', '.join(departures)}"
+        )
 
 
 def writable(folder: Path, otherwise: Path) -> Path:

@@ -27,10 +27,8 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any], results: Path) -> I
 
     Parameters
     ----------
-    notebook
-        The notebook.
-    values
-        Parameters of the run that differ from the notebook's literals.
+    notebook, values
+        What is run, and parameters that differ from its literals.
     results
         The folder that holds the published folders of the notebooks that it needs.
 
@@ -70,17 +68,17 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any], results: Path) -> I
 
 def changes(before: Inputs, now: Inputs) -> list[str]:
     """Return what differs between the inputs of a run and those of now, in words."""
-    found = []
+    differing = []
     for key, what in (("parameters", "parameter "), ("data", ""), ("source", "")):
         old, new = before.get(key, {}), now[key]
         names = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
-        found += [f"{what}{name} has changed" for name in names]
+        differing += [f"{what}{name} has changed" for name in names]
     labels = {
         "cells": "the notebook's code has changed",
         "outputs": "the notebook declares other outputs",
         "lock": "environment.lock has changed",
     }
-    return found + [label for key, label in labels.items() if before.get(key) != now[key]]
+    return differing + [label for key, label in labels.items() if before.get(key) != now[key]]
 
 
 def file_hash(path: Path) -> str:

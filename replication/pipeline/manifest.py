@@ -11,15 +11,20 @@ import datetime
 import importlib.metadata
 import json
 import platform
+import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import joblib
+
+from replication import files
 from replication.files import write_file
+from replication.pipeline.declaration import EXECUTED, MANIFEST
 from replication.pipeline.inputs import Inputs, changes, file_hash, text_hash
-from replication.pipeline.notebook import EXECUTED, INJECTED, MANIFEST
+from replication.pipeline.notebook import INJECTED
 
 FORMAT, VERSION = "replication-provenance", 2
 
@@ -58,21 +63,20 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Return the manifest of a notebook's folder; empty if there is none that can be used."""
     try:
         document = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        parts = [document["outputs"], *(document["inputs"][k] for k in ("parameters", "data"))]
-        parts.append(document["inputs"]["source"])
-        if (document["format"], document["version"]) != (FORMAT, VERSION):
-            return {}
+        inputs = [document["inputs"][part] for part in ("parameters", "data", "source")]
+        known = (document["format"], document["version"]) == (FORMAT, VERSION)
+        usable = known and all(isinstance(part, dict) for part in [document["outputs"], *inputs])
     except (OSError, ValueError, KeyError, TypeError):
         return {}
-    return dict(document) if all(isinstance(part, dict) for part in parts) else {}
+    return dict(document) if usable else {}
 
 
 def published_folders(out: Path) -> dict[str, dict[str, Any]]:
     """Return the manifests of all notebooks' folders in `out`, by name."""
     if not out.is_dir():
         return {}
-    found = {path.name: read_manifest(path) for path in sorted(out.glob("[!.]*"))}
-    return {name: manifest for name, manifest in found.items() if manifest}
+    manifests = {path.name: read_manifest(path) for path in sorted(out.glob("[!.]*"))}
+    return {name: manifest for name, manifest in manifests.items() if manifest}
 
 
 def write_manifest(folder: Path, inputs: Inputs, names: tuple[str, ...]) -> None:
@@ -118,22 +122,29 @@ def output_hash(path: Path) -> str:
     return text_hash(json.dumps(given, sort_keys=True))
 
 
-def damaged(folder: Path, manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Return the outputs in a manifest that are "missing" or "changed" since the run, by name."""
-    found = {}
+def damaged(
+    folder: Path, manifest: Mapping[str, Any], names: Collection[str] | None = None
+) -> dict[str, str]:
+    """Return those of all or some outputs that are "missing" or "changed" since the run, by name.
+
+    An output that the manifest does not know is no output.
+    """
+    lost = {}
     for name, expected in manifest["outputs"].items():
+        if names is not None and name not in names:
+            continue
         if not (folder / name).is_file():
-            found[name] = "missing"
+            lost[name] = "missing"
         elif output_hash(folder / name) != expected:
-            found[name] = "changed"
-    return found
+            lost[name] = "changed"
+    return lost
 
 
 def versions() -> dict[str, str]:
     """Return what a run ran on, in neutral words."""
-    found = {name: importlib.metadata.version(name) for name in REPORTED}
+    packages = {name: importlib.metadata.version(name) for name in REPORTED}
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
-    return {"python": python, "platform": f"{platform.system()} {platform.machine()}", **found}
+    return {"python": python, "platform": f"{platform.system()} {platform.machine()}", **packages}
 
 
 def read_runs(out: Path) -> dict[str, Any]:
@@ -148,10 +159,30 @@ def read_runs(out: Path) -> dict[str, Any]:
     return {name: entry for name, entry in runs.items() if _is_run(entry)}
 
 
-def record_run(out: Path, name: str, entry: Mapping[str, Any]) -> None:
-    """Record a notebook's last run."""
-    runs = read_runs(out) | {name: dict(entry)}
+def record_run(out: Path, name: str, seconds: float) -> None:
+    """Record a notebook's last run: its time, the commit and the machine."""
+    git = [_git("rev-parse", "HEAD"), _git("status", "--porcelain")]
+    entry = {
+        "commit": git[0] or "",
+        "clean": git[1] == "",
+        "machine": f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores",
+        "seconds": round(seconds, 1),
+        "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+    runs = read_runs(out) | {name: entry}
     write_file(out / RUNS, json.dumps(runs, indent=1, sort_keys=True) + "\n")
+
+
+def _git(*words: str) -> str | None:
+    """Return what git says of the project; None without git."""
+    try:
+        command = ["git", *words]
+        done = subprocess.run(
+            command, cwd=files.PROJECT, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
 
 
 def _is_run(entry: Any) -> bool:

@@ -1,53 +1,35 @@
-"""What a notebook declares: its parameters, what a run publishes, what it reads, and its profiles.
+"""Notebooks as files: one cell tagged `parameters`, code and text, and what they declare.
 
-A notebook has one cell tagged `parameters`, which holds literals only; `out`, the folder that it
-writes to, is one of them. Its metadata declare what it writes there::
-
-    {
-        "replication": {
-            "figures": ["fig05"],
-            "tables": ["table1"],
-            "players": ["player"],
-            "data": ["trials.csv"],
-            "needs": [],
-            "inputs": ["replication/paper/choices.toml"],
-            "profiles": {"quick": {"trials": 6}, "paper": {"trials": 100}},
-        }
-    }
-
-See :class:`Declaration` for each of them.
+The parameters cell holds literals only; `out`, the folder that the notebook writes to, is one of
+them.
 """
 
 from __future__ import annotations
 
 import ast
 import json
-import math
-import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from replication.errors import UserError, unknown
-
-EXECUTED = "notebook.ipynb"
-"""The executed notebook, in the folder of its outputs."""
-
-MANIFEST = "provenance.json"
-"""What the outputs came from, in the same folder."""
+from replication.pipeline.declaration import EXECUTED, Declaration
 
 INJECTED = "injected-parameters"
 """The tag that papermill gives to its own cell."""
 
-SUFFIXES = {
-    "figures": (".csv", ".png", ".svg"),
-    "tables": (".csv", ".md"),
-    "players": (".csv", ".html"),
-    "data": ("",),
+KINDS: dict[type, str] = {
+    type(None): "null",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "text",
+    list: "a list",
+    dict: "an object",
 }
 
 
@@ -63,61 +45,7 @@ class RunError(RuntimeError):
         self.details = details
 
 
-def _plain(names: tuple[str, ...]) -> tuple[str, ...]:
-    for name in names:
-        if not re.fullmatch(r"\w[\w.-]*", name):
-            raise ValueError(f"{name!r} is not a plain name without a folder")
-        if name in (EXECUTED, MANIFEST):
-            raise ValueError(f"{name!r} is written by every run")
-        if names.count(name) > 1:
-            raise ValueError(f"{name!r} stands there twice")
-    return names
-
-
-Names = Annotated[tuple[str, ...], AfterValidator(_plain)]
-
-
-class Declaration(BaseModel):
-    """The metadata `replication` of a notebook.
-
-    Attributes
-    ----------
-    figures, tables, players
-        Outputs by their names without suffix: a figure is NAME.png, NAME.svg and its numbers
-        NAME.csv, a table NAME.md and NAME.csv, a player NAME.html and NAME.csv.
-    data
-        Other files that it writes.
-    needs
-        Notebooks whose published folders it reads, from the folder in its parameter `results`.
-    inputs
-        Files of the project that it reads without having them as parameters.
-    profiles
-        Parameter values by the name of the profile; a profile that is not among them keeps the
-        literals of the parameters cell.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    figures: Names = ()
-    tables: Names = ()
-    players: Names = ()
-    data: Names = ()
-    needs: Names = ()
-    inputs: tuple[str, ...] = ()
-    profiles: dict[str, dict[str, Any]] = {}
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The names of all files."""
-        groups = ((getattr(self, kind), suffixes) for kind, suffixes in SUFFIXES.items())
-        names = [
-            stem + suffix for stems, suffixes in groups for stem in stems for suffix in suffixes
-        ]
-        return tuple(dict.fromkeys(names))
-
-
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """The kind of a cell ("code", "markdown" or "raw"), its text and its tags."""
 
     kind: str
@@ -127,20 +55,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Notebook:
-    """A notebook that was read, and whose declarations were checked.
+    """A notebook's file, its text and cells, and what it declares; all of it was checked.
 
-    Attributes
-    ----------
-    path, text
-        Its file and what that holds.
-    cells
-        Its cells.
-    at
-        Index of the parameters cell.
-    literals
-        The parameters and their values, from the parameters cell.
-    declared
-        What it declares.
+    `at` is the index of the parameters cell, and `literals` are the values in it.
     """
 
     path: Path
@@ -161,7 +78,7 @@ class Notebook:
         return (*self.declared.outputs, EXECUTED)
 
     def load(self) -> Any:
-        """Return the contents as nbformat has them.
+        """Return the contents as nbformat has them, with links as in a published notebook.
 
         Raises
         ------
@@ -177,13 +94,15 @@ class Notebook:
                 nbformat.validate(node)
         except Exception as error:  # whatever the contents make the reader raise
             refuse(self.path, f"is not a valid notebook: {first_line(error)}")
+        for cell in node.cells:
+            cell.source = as_published(cell.cell_type, cell.source)
         return node
 
     def shows(self, executed: str) -> bool:
         """Return whether the text of an executed notebook's file has this text and code."""
         _, cells = _parsed(executed)
         shown = [cell.source for cell in cells if INJECTED not in cell.tags]
-        return shown == [cell.source for cell in self.cells]
+        return shown == [as_published(cell.kind, cell.source) for cell in self.cells]
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse values of parameters that the notebook does not have, or of another type.
@@ -197,10 +116,23 @@ class Notebook:
             if name not in self.literals:
                 refuse(self.path, unknown(name, self.literals, "parameter"))
             literal = self.literals[name]
-            if not _is_json(value) or not _same_type(value, literal):
+            types = {type(literal), type(value)}
+            fits = len(types) == 1 or (types == {float, int} and type(value) is int)
+            if not _is_json(value) or not (fits or literal is None):
                 expected = f"{_kind(literal)}, such as {json.dumps(literal)}"
                 message = f"parameter {name!r} is {expected}; {value!r} is {_kind(value)}"
                 refuse(self.path, message)
+
+
+def as_published(kind: str, source: str) -> str:
+    """Return a cell's text; a published notebook lies one folder deeper, and so do its links.
+
+    Examples
+    --------
+    >>> as_published("markdown", "see [choices](../replication/paper/choices.toml)")
+    'see [choices](../../replication/paper/choices.toml)'
+    """
+    return source.replace("](../", "](../../") if kind == "markdown" else source
 
 
 def read_notebook(path: Path) -> Notebook:
@@ -279,16 +211,13 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
     for statement in statements:
         text = source.splitlines()[statement.lineno - 1].strip()
         place = f"line {statement.lineno} of the parameters cell, `{text}`"
-        match statement:
-            case ast.Assign(targets=[ast.Name(id=name)], value=node):
-                pass
-            case _:
-                name, node = "", ast.Constant(None)
         try:
-            value = ast.literal_eval(node)
+            match statement:
+                case ast.Assign(targets=[ast.Name(id=name)], value=node):
+                    value = ast.literal_eval(node)
+                case _:
+                    raise ValueError(text)
         except (TypeError, ValueError, RecursionError, MemoryError):
-            name, value = "", None
-        if not name:
             only = "only `name = literal` is allowed here; move other code to the next cell"
             refuse(path, f"{place}: {only}")
         if not _is_json(value):
@@ -301,26 +230,14 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
 
 
 def _is_json(value: Any) -> bool:
-    if isinstance(value, list):
-        return all(map(_is_json, value))
-    if isinstance(value, dict):
-        return all(type(key) is str for key in value) and all(map(_is_json, value.values()))
-    if type(value) is float:
-        return math.isfinite(value)
-    return value is None or type(value) in (bool, int, str)
-
-
-def _same_type(value: Any, literal: Any) -> bool:
-    if literal is None:
-        return True
-    return type(value) is type(literal) or (type(literal) is float and type(value) is int)
+    try:
+        return bool(json.loads(json.dumps(value, allow_nan=False)) == value)
+    except (TypeError, ValueError, RecursionError):
+        return False
 
 
 def _kind(value: Any) -> str:
-    if value is None:
-        return "null"
-    kinds = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
-    return (kinds | {list: "a list", dict: "an object"}).get(type(value), "no JSON value")
+    return KINDS.get(type(value), "no JSON value")
 
 
 def first_line(error: object) -> str:

@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.manifest import hashes, output_hash, read_manifest
-from replication.pipeline.notebook import MANIFEST, Notebook, RunError, refuse
+from replication.pipeline.notebook import Notebook, RunError, refuse
 
 DRAFT, ASIDE = ".draft-", ".aside-"
 """What the names of folders begin with that are half-written, or renamed aside."""

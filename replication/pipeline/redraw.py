@@ -8,16 +8,17 @@ from __future__ import annotations
 import base64
 import json
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from replication.errors import unknown
 from replication.files import write_file
+from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive
 from replication.pipeline.index import shown_outputs, write_index
 from replication.pipeline.manifest import damaged, hashes, published_folders, save_manifest
-from replication.pipeline.notebook import EXECUTED, NotebookError, first_line
+from replication.pipeline.notebook import NotebookError, first_line
 from replication.pipeline.publish import draft_folder, swap
 
 Draw = Callable[[str, Path], Mapping[str, bytes]]
@@ -27,18 +28,10 @@ Draw = Callable[[str, Path], Mapping[str, bytes]]
 def redraw(
     out: Path, names: Sequence[str], *, draw: Draw, echo: Callable[[str], object] = print
 ) -> None:
-    """Redraw figures; say which have changed.
+    """Redraw figures in the notebooks' folders in `out`; say which have changed.
 
-    Parameters
-    ----------
-    out
-        The folder that holds the notebooks' folders.
-    names
-        Figures (`fig05`, or `open_maze/fig05`) or notebooks; all figures if empty.
-    draw
-        Draws one figure.
-    echo
-        Prints a line.
+    `names` are those of figures (`fig05`, or `open_maze/fig05`) or notebooks; if empty, all
+    figures are drawn.
 
     Raises
     ------
@@ -47,48 +40,37 @@ def redraw(
     """
     with exclusive(out, echo):
         manifests = published_folders(out)
+        for notebook, manifest in manifests.items():
+            _check_whole(out / notebook, manifest, EXECUTED)
         figures = {
             (notebook, shown["name"]): shown["code"]
             for notebook in manifests
             for shown, _ in shown_outputs(out / notebook)
             if shown.get("kind") == "figure" and "code" in shown
         }
+        called = {key: {*key, "/".join(key)} for key in figures}
+        known = sorted(set().union(*called.values()))
         for name in names:
-            known = {*(f"{n}/{figure}" for n, figure in figures), *_parts(figures)}
             if name not in known:
-                raise NotebookError(unknown(name, sorted(known), "figure"))
-        number = 0
+                raise NotebookError(unknown(name, known, "figure"))
+        chosen = [key for key in figures if not names or called[key] & {*names}]
         for notebook, manifest in manifests.items():
-            chosen = {
-                figure: code
-                for (owner, figure), code in figures.items()
-                if owner == notebook
-                and (not names or {owner, figure, f"{owner}/{figure}"} & {*names})
-            }
-            number += len(chosen)
-            changed = _redraw_folder(out / notebook, manifest, chosen, draw)
-            for figure in changed:
+            codes = {key[1]: figures[key] for key in chosen if key[0] == notebook}
+            for figure in _redraw_folder(out / notebook, manifest, codes, draw):
                 echo(f"{notebook}/{figure}: redrawn, other bytes than before")
         write_index(out)
+        number = len(chosen)
         echo(f"{number} figure{'s' * (number != 1)} drawn; the others have the same bytes")
-
-
-def _parts(figures: Iterable[tuple[str, str]]) -> set[str]:
-    return {part for figure in figures for part in figure}
 
 
 def _redraw_folder(
     folder: Path, manifest: dict[str, Any], figures: Mapping[str, str], draw: Draw
 ) -> list[str]:
     """Redraw figures of one folder, which is replaced as a whole; return those that changed."""
-    lost = damaged(folder, manifest)
     drawn: dict[str, bytes] = {}
     for figure, code in figures.items():
         table = f"{figure}.csv"
-        if table in lost or EXECUTED in lost:
-            file, how = (table, lost[table]) if table in lost else (EXECUTED, lost[EXECUTED])
-            message = f"is {how} since its run; first: replicate run {folder.name}"
-            raise NotebookError(f"{folder / file}: {message}")
+        _check_whole(folder, manifest, table)
         try:
             pictures = draw(code, folder / table)
         except Exception as error:  # whatever other code makes of the table
@@ -111,6 +93,12 @@ def _redraw_folder(
         save_manifest(draft, manifest | {"outputs": outputs})
         swap(draft, folder)
     return sorted({name.rpartition(".")[0] for name in new})
+
+
+def _check_whole(folder: Path, manifest: Mapping[str, Any], file: str) -> None:
+    if how := damaged(folder, manifest, (file,)).get(file):
+        message = f"is {how} since its run; first: replicate run {folder.name}"
+        raise NotebookError(f"{folder / file}: {message}")
 
 
 def _embedded(notebook: Path, drawn: Mapping[str, bytes]) -> str:

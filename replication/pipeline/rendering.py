@@ -30,8 +30,8 @@ def read_executed(file: Path, folders: Mapping[Path, Path]) -> Any:
     return node
 
 
-def clean(notebook: Notebook, node: Any) -> None:
-    """Remove from an executed notebook what differs between equal runs."""
+def clean(notebook: Notebook, node: Any) -> Any:
+    """Remove from an executed notebook what differs between equal runs, and return it."""
     node.metadata.pop("papermill", None)
     # recorded in the manifest as major.minor
     node.metadata.get("language_info", {}).pop("version", None)
@@ -45,15 +45,17 @@ def clean(notebook: Notebook, node: Any) -> None:
         if INJECTED in _tags(cell):
             lines = cell.source.split("\n")
             cell.source = "\n".join(_as_declared(notebook, line) for line in lines)
+    return node
 
 
-def link_players(node: Any) -> None:
-    """Replace each player in an executed notebook by a link to its file, which is large."""
+def link_players(node: Any) -> Any:
+    """Replace each player in an executed notebook, which is large, by a link to its file."""
     for output in (output for cell in node.cells for output in cell.get("outputs", [])):
         shown = output.get("metadata", {}).get("replication", {})
         if shown.get("kind") == "player":
             file = f"{shown['name']}.html"
             output.data = {"text/markdown": f"[{shown.get('alt') or file}]({file})"}
+    return node
 
 
 def rendered(notebook: Notebook, executed: Path) -> str:

@@ -7,12 +7,9 @@ goes on from there.
 
 from __future__ import annotations
 
-import datetime
 import json
 import os
-import platform
 import socket
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,15 +19,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import joblib
-
-from replication import files
 from replication.files import write_file
-from replication.pipeline.folders import PAPER, exclusive, failed_notebook, store_file
+from replication.pipeline.declaration import EXECUTED
+from replication.pipeline.folders import check_profile, exclusive, failed_notebook, store_file
 from replication.pipeline.index import write_index
 from replication.pipeline.inputs import changes
 from replication.pipeline.manifest import FRESH, read_runs, record_run, write_manifest
-from replication.pipeline.notebook import EXECUTED, NotebookError, RunError, first_line
+from replication.pipeline.notebook import NotebookError, RunError, first_line
 from replication.pipeline.plan import Run, departures, prepare
 from replication.pipeline.publish import check_outputs, check_target, differing, draft_folder, swap
 from replication.progress import SCHEDULER, Display
@@ -43,15 +38,7 @@ Echo = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Published:
-    """What a run has published.
-
-    Attributes
-    ----------
-    files
-        All files.
-    changed
-        Those of them, and files that are gone, that are not as they were published before.
-    """
+    """All files that a run has published; `changed` are those with other bytes, or gone now."""
 
     files: tuple[Path, ...]
     changed: tuple[Path, ...]
@@ -62,16 +49,13 @@ def run_notebooks(
     *,
     profile: str,
     out: Path,
-    jobs: int | None = None,
-    seed: int | None = None,
-    parameters: Mapping[str, Any] | None = None,
     timeout: int = TIMEOUT,
     force: bool = False,
     here: bool = False,
     scheduler: str = "",
     checks: Mapping[str, Callable[[], object]] | None = None,
-    progress: bool | None = None,
     echo: Echo = print,
+    **asked: Any,
 ) -> list[Published]:
     """Run those notebooks that are not up to date and publish their outputs.
 
@@ -82,20 +66,9 @@ def run_notebooks(
 
     Parameters
     ----------
-    notebooks
-        Their files.
-    profile
-        "paper", or another name that notebooks may have parameter values for.
-    out
-        Folder for the notebooks' folders; made when missing. The project's `figures` hold what the
-        profile "paper" gives, unchanged, and take nothing else.
-    jobs
-        Worker processes, for the parameter `jobs`; None gives those notebooks that have the
-        parameter as many as there are usable cores.
-    seed
-        For the parameter `seed`; None keeps each notebook's own.
-    parameters
-        Other parameter values, which every notebook must know.
+    notebooks, profile, out, **asked
+        See :func:`plan.prepare`. The project's `figures` take nothing but what the profile "paper"
+        gives, unchanged.
     timeout
         Seconds that one cell may take.
     force
@@ -107,8 +80,6 @@ def run_notebooks(
     checks
         Functions that check files which notebooks declare as `inputs`, by the name of the file;
         they are called before a run of a notebook that reads the file.
-    progress
-        Whether progress bars are drawn; None draws them on a terminal only.
     echo
         Prints a line.
 
@@ -122,31 +93,32 @@ def run_notebooks(
         If a cell failed, took too long or killed its kernel, or if its outputs are not the
         declared ones or cannot be written.
     """
-    _check_paper(out, profile, departures(seed, parameters))
-    asked: dict[str, Any] = {"profile": profile, "jobs": jobs, "seed": seed, "out": out}
-    runs = prepare(notebooks, parameters=parameters, **asked)
+    other = [] if profile == "paper" else [f"--profile {profile}"]
+    check_profile(out, [*other, *departures(asked.get("seed"), asked.get("parameters"))])
+    runs = prepare(notebooks, profile=profile, out=out, **asked)
     for run in runs:
         check_target(run.notebook, run.folder)
     with exclusive(out, echo) as waited:
         if waited:  # notebooks may have been edited meanwhile
-            runs = prepare(notebooks, parameters=parameters, **asked)
+            runs = prepare(notebooks, profile=profile, out=out, **asked)
         elsewhere = {run.name for run in runs} - read_runs(out).keys() if here else set()
-        due = {run.name for run in runs if force or run.name in elsewhere or _is_stale(run)}
+
+        def is_due(run: Run) -> bool:
+            return force or run.name in elsewhere or run.state.kind != FRESH
+
+        due = {run.name for run in runs if is_due(run)}
         for run in runs:  # what a notebook needs may come out differently
             if due.intersection(run.notebook.declared.needs):
                 due.add(run.name)
         _check([run for run in runs if run.name in due], checks or {}, scheduler)
         published = []
-        with Display(
-            len(due), bars=sys.stderr.isatty() if progress is None else progress
-        ) as display:
+        with Display(len(due), bars=sys.stderr.isatty()) as display:
             for run in map(Run.again, runs):
-                name = run.name
-                if not (force or name in elsewhere or _is_stale(run)):
-                    echo(f"{name}: fresh, nothing to do")
+                if not is_due(run):
+                    echo(f"{run.name}: fresh, nothing to do")
                     render_text(run)
                     continue
-                display.begin(name)
+                display.begin(run.name)
                 options = {"timeout": timeout, "scheduler": scheduler, "display": display}
                 published.append(_run_one(run, force=force, echo=echo, **options))
                 display.end()
@@ -154,26 +126,11 @@ def run_notebooks(
     return published
 
 
-def _is_stale(run: Run) -> bool:
-    return run.state.kind != FRESH
-
-
-def _check_paper(out: Path, profile: str, changed: list[str]) -> None:
-    """Refuse results that are not the paper's in the folder of the paper's results."""
-    changed = changed if profile == "paper" else [f"--profile {profile}", *changed]
-    if changed and out.resolve().is_relative_to((files.PROJECT / PAPER).resolve()):
-        raise NotebookError(
-            f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
-            f"for a run with {', '.join(changed)}"
-        )
-
-
 def _check(runs: Sequence[Run], checks: Mapping[str, Callable[[], object]], scheduler: str) -> None:
     """Check what is about to run, as far as it can be checked in a second."""
     named = {name for run in runs for name in run.notebook.declared.inputs}
-    for name, check in checks.items():
-        if name in named:
-            check()
+    for name in named & checks.keys():
+        checks[name]()
     for run in runs:
         run.notebook.load()  # refuses one that is not valid before the first one runs
     address = scheduler or os.environ.get(SCHEDULER, "")
@@ -229,18 +186,16 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
         except OSError as error:
             reason = error.strerror or str(error)  # the path of a draft would not help the user
             raise RunError(f"{notebook.path}: cannot publish to {run.out}: {reason}") from error
-    seconds = round(time.monotonic() - began, 1)
-    record_run(run.out, run.name, _where() | {"seconds": seconds, "finished": _now()})
+    seconds = time.monotonic() - began
+    record_run(run.out, run.name, seconds)
     failed.unlink(missing_ok=True)
     number = len(notebook.declared.outputs)
     compared = "" if differ is None else "; all bytes as before"
     if differ:
         compared = f"; other bytes than before: {', '.join(differ)}"
     echo(f"{run.name}: {number} output{'s' * (number != 1)} in {seconds:.1f} s{compared}")
-    return Published(
-        tuple(run.folder / name for name in notebook.published),
-        tuple(run.folder / name for name in differ or ()),
-    )
+    files = [run.folder / name for name in notebook.published]
+    return Published(tuple(files), tuple(run.folder / name for name in differ or ()))
 
 
 def render_text(run: Run) -> None:
@@ -252,28 +207,3 @@ def render_text(run: Run) -> None:
     from replication.pipeline.rendering import rendered  # loads nbformat
 
     write_file(published, rendered(run.notebook, published))
-
-
-def _where() -> dict[str, Any]:
-    """Return what a run runs on: the commit, whether nothing was changed since, the machine."""
-    commit, clean = _commit()
-    machine = f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores"
-    return {"commit": commit, "clean": clean, "machine": machine}
-
-
-def _now() -> str:
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-
-
-def _commit() -> tuple[str, bool]:
-    """Return the project's commit, and whether nothing was changed since; empty without git."""
-    try:
-        head, changed = (
-            subprocess.run(
-                ["git", *words], cwd=files.PROJECT, capture_output=True, text=True, check=True
-            ).stdout.strip()
-            for words in (("rev-parse", "HEAD"), ("status", "--porcelain"))
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return "", False
-    return head, not changed

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.folders import exclusive
 from replication.pipeline.manifest import (
     FRESH,
@@ -16,21 +17,15 @@ from replication.pipeline.manifest import (
     read_manifest,
     read_runs,
 )
-from replication.pipeline.notebook import MANIFEST, refuse
+from replication.pipeline.notebook import refuse
 from replication.pipeline.plan import Run
 
 
 def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) -> list[str]:
     """Return the state of every figure and table, notebook by notebook, a line each.
 
-    Parameters
-    ----------
-    runs
-        All notebooks with their parameters and inputs of now.
-    out
-        The folder that holds the notebooks' folders.
-    options
-        The options that choose these outputs, for the commands that are recommended.
+    `runs` are all notebooks as they are now, `out` holds their folders. The commands that are
+    recommended have the `options` that choose these outputs.
     """
     recorded = read_runs(out)
     lines, due = [], []
@@ -51,8 +46,7 @@ def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) ->
             suffixes = " ".join(name.removeprefix(stem) for name in names)
             lines.append(f"    {text:<9}{stem} {suffixes}")
     left = gone(runs, out)
-    lines += [f"{name}: its notebook is gone" for name in left]
-    lines.append("")
+    lines += [*(f"{name}: its notebook is gone" for name in left), ""]
     if due:
         lines.append(f"to bring {out.name} up to date: {_command('run', *due, *options)}")
     else:
@@ -68,21 +62,11 @@ def gone(runs: Sequence[Run], out: Path) -> list[str]:
 
 
 def clean(runs: Sequence[Run], out: Path, *, dry_run: bool, echo: Callable[[str], object]) -> None:
-    """Remove files that no notebook declares from the notebooks' folders.
+    """Remove files that none of all notebooks declares from the notebooks' folders in `out`.
 
     Of a notebook that is gone, only what its manifest names is removed, and the folder if it is
-    empty then. Everything else in `out` stays, such as stored trials.
-
-    Parameters
-    ----------
-    runs
-        All notebooks.
-    out
-        The folder that holds the notebooks' folders.
-    dry_run
-        Whether only to say what would be removed.
-    echo
-        Prints a line.
+    empty then. Everything else in `out` stays, such as stored trials. A dry run only says what
+    would be removed.
 
     Raises
     ------

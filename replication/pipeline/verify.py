@@ -10,18 +10,19 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.inputs import changes
 from replication.pipeline.manifest import damaged, published_folders, read_manifest
-from replication.pipeline.notebook import MANIFEST
 from replication.pipeline.plan import Run
 from replication.pipeline.status import gone
 
 
 def verify_outputs(out: Path) -> Iterator[str]:
     """Yield what is wrong with the published files, held against their manifests."""
-    if not published_folders(out):
+    published = published_folders(out)
+    if not published:
         yield f"no folder in {out} has a {MANIFEST} that can be read: nothing can be proved"
-    for name, manifest in published_folders(out).items():
+    for name, manifest in published.items():
         for output, how in damaged(out / name, manifest).items():
             yield f"{name}/{output} is {how} since its run"
 

@@ -15,9 +15,9 @@ from replication import files
 from replication.errors import UserError
 from replication.evidence.tables import read_table
 from replication.files import write_file
+from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
 from replication.pipeline.manifest import FRESH, read_runs
-from replication.pipeline.notebook import EXECUTED
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
 from replication.report.findings import holding

@@ -80,7 +80,8 @@ def _parts(
 ) -> Iterator[dict[str, Any]]:
     """Yield a cell, and below it a cell of text for each output that is shown as text."""
     if cell["cell_type"] != "code":
-        yield {**cell, "source": link_choices("".join(cell["source"]))}
+        source = "".join(cell["source"]).replace("](../../", "](../")  # pages lie less deep
+        yield {**cell, "source": link_choices(source)}
         return
     shown = [_shown(output, folder, origin, named) for output in cell["outputs"]]
     kept = [output for output, text in zip(cell["outputs"], shown, strict=True) if text is None]

@@ -19,13 +19,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import nbformat
-from nbformat.v4 import new_code_cell, new_notebook
-
-from replication import demonstrate, save_demos
+from replication import Demos, demonstrate, save_demos
 from replication.envs.maze import Maze
 from replication.files import PROJECT
+from replication.paper.params import Params
 from replication.pipeline.manifest import RUNS
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+from replication.trials.run import run_trials
+from replication.trials.store import Store
+from tests.notebooks import write_notebook
 
 TASKS, TRIALS = 12, 3
 """The toy notebook's trials: so many tasks, each a chunk of so many trials."""
@@ -88,12 +91,8 @@ SMALL = "\n".join((".......", ".....G.", "...#...", ".......", ".S.....", ".....
 
 def notebook(path: Path, *cells: str, data: list[str], parameters: str = PARAMETERS) -> None:
     """Write a notebook."""
-    nodes = [new_code_cell(parameters), *(new_code_cell(cell.strip()) for cell in cells)]
-    nodes[0].metadata["tags"] = ["parameters"]
-    for number, node in enumerate(nodes):
-        node["id"] = f"cell-{number}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    nbformat.write(new_notebook(cells=nodes, metadata={"replication": {"data": data}}), path)
+    sources = [cell.strip() for cell in cells]
+    write_notebook(path, *sources, parameters=parameters, data=data)
 
 
 # Compiles what the toy notebook needs, so that no test waits for it.
@@ -110,9 +109,8 @@ def _snapshot() -> Path:
     """Copy the package once: whoever edits it while the tests run does not disturb them."""
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    project = PROJECT
-    shutil.copytree(project / "replication", folder / "replication")
-    shutil.copy2(project / "environment.lock", folder)
+    shutil.copytree(PROJECT / "replication", folder / "replication")
+    shutil.copy2(PROJECT / "environment.lock", folder)
     subprocess.run([sys.executable, "-c", WARM], cwd=folder, check=True, timeout=600)
     return folder
 
@@ -129,12 +127,7 @@ class Checkout:
         self.mark = uuid.uuid4().hex
         self.scratch = self.folder.with_name(self.folder.name + "-scratch")
         self.scratch.mkdir(parents=True)
-        for part in ("replication", "environment.lock"):
-            source, target = _snapshot() / part, self.folder / part
-            if source.is_dir():
-                shutil.copytree(source, target)  # numba's cache, too: its stamps are the files'
-            else:
-                shutil.copy2(source, target)
+        shutil.copytree(_snapshot(), self.folder)  # numba's cache, too: its stamps are the files'
         (self.folder / "data" / "demos").mkdir(parents=True)
         save_demos(
             demonstrate("small", Maze.from_text(SMALL)), self.folder / "data/demos/small.json"
@@ -150,6 +143,17 @@ class Checkout:
     def gate(self) -> Path:
         """The file that keeps a run from ending, as long as it exists."""
         return self.scratch / "gate"
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """The environment variables of all that runs here."""
+        return {
+            "FAULTS_MARK": self.mark,
+            "PYTHONPATH": str(self.folder),
+            "TMPDIR": str(self.scratch),
+            "TOY_NOTES": str(self.notes),
+            "TOY_GATE": str(self.gate),
+        }
 
     @property
     def computed(self) -> list[str]:
@@ -172,17 +176,10 @@ class Checkout:
     def start(self, *words: str | Path, **options: Any) -> subprocess.Popen[str]:
         """Start `replicate`, as the leader of a process group."""
         kept = {k: v for k, v in os.environ.items() if not k.startswith(("JUPYTER", "IPYTHON"))}
-        own = {
-            "FAULTS_MARK": self.mark,
-            "PYTHONPATH": str(self.folder),
-            "TMPDIR": str(self.scratch),
-            "TOY_NOTES": str(self.notes),
-            "TOY_GATE": str(self.gate),
-        }
         return subprocess.Popen(
             [*self.prefix, sys.executable, "-c", PROGRAM, *map(str, words)],
             cwd=self.folder,
-            env=kept | own | self.environment,
+            env=kept | self.variables | self.environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -201,6 +198,26 @@ class Checkout:
     def results(self, out: str = "figures") -> dict[str, bytes]:
         """Return the outputs, their manifest and the executed notebook, by name."""
         return {path.name: path.read_bytes() for path in (self.folder / out / "toy").iterdir()}
+
+
+def run_few(demos: Demos, path: Path, number: int = TASKS) -> Results:
+    """Run a few trials of some conditions in this process, or where the environment says."""
+    conditions = [
+        Condition(demos, "unified", Params.of(episodes=60 + n, horizon=40, max_iterations=40))
+        for n in range(number)
+    ]
+    return run_trials(conditions, trials=TRIALS, store=Store(path), seed=5)
+
+
+def bits(results: Results) -> list[bytes]:
+    """Return all arrays of all trials."""
+    return [
+        array.tobytes()
+        for condition in results.conditions
+        for k in range(results.trials)
+        for trial in [results.trial(condition, k)]
+        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
+    ]
 
 
 @dataclass(frozen=True)

@@ -13,25 +13,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook
 
 from replication import Demos
 from replication.files import PROJECT
 from replication.irl import Trial
-from replication.paper.params import Params
 from replication.progress import SCHEDULER
-from replication.trials.condition import Condition
-from replication.trials.results import Results
-from replication.trials.run import WorkerError, run_trials
+from replication.trials.run import WorkerError
 from replication.trials.store import Store
-from tests.faults.checkout import Checkout, Reference, gone, listening, wait
+from tests.faults.checkout import Checkout, Reference, bits, gone, listening, run_few, wait
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
-
-TASKS, TRIALS = 12, 3
 
 CLUSTER = """
 import sys
@@ -89,24 +82,6 @@ def start(tmp_path: Path) -> Iterator[StartCluster]:
         process.communicate(timeout=60)  # closes its input, at which it ends
 
 
-def _run(demos: Demos, path: Path, episodes: int = 60) -> Results:
-    conditions = [
-        Condition(demos, "unified", Params.of(episodes=episodes + n, horizon=40, max_iterations=40))
-        for n in range(TASKS)
-    ]
-    return run_trials(conditions, trials=TRIALS, store=Store(path), seed=5)
-
-
-def _bits(results: Results) -> list[bytes]:
-    return [
-        array.tobytes()
-        for condition in results.conditions
-        for k in range(results.trials)
-        for trial in [results.trial(condition, k)]
-        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
-    ]
-
-
 @pytest.mark.parametrize("killed", [False, True])
 def test_a_cluster_does_not_change_a_bit(
     small_demos: Demos,
@@ -116,7 +91,7 @@ def test_a_cluster_does_not_change_a_bit(
     killed: bool,
 ) -> None:
     """Two workers give the bits that one process gives, also when one of them is killed."""
-    alone = _bits(_run(small_demos, tmp_path / "alone.sqlite"))
+    alone = bits(run_few(small_demos, tmp_path / "alone.sqlite"))
     cluster = start()
     monkeypatch.setenv(SCHEDULER, cluster.address)
     put = Store.put
@@ -129,7 +104,7 @@ def test_a_cluster_does_not_change_a_bit(
             os.kill(cluster.workers[0], signal.SIGKILL)
 
     monkeypatch.setattr(Store, "put", put_and_kill)
-    assert _bits(_run(small_demos, tmp_path / "shared.sqlite")) == alone
+    assert bits(run_few(small_demos, tmp_path / "shared.sqlite")) == alone
     assert len(killings) == killed
 
 
@@ -142,51 +117,10 @@ def test_a_worker_with_other_code_is_refused(
         file.write("\nCHANGED = True\n")
     monkeypatch.setenv(SCHEDULER, start(str(tmp_path / "other")).address)
     with pytest.raises(WorkerError, match=r"other code.*install the same commit"):
-        _run(small_demos, tmp_path / "trials.sqlite")
+        run_few(small_demos, tmp_path / "trials.sqlite")
     store = Store(tmp_path / "trials.sqlite")
     with store._connection as connection:
         assert connection.execute("SELECT COUNT(*) FROM trials").fetchone() == (0,)
-
-
-def test_a_notebook_runs_on_a_cluster(
-    small_demos: Demos, tmp_path: Path, start: StartCluster
-) -> None:
-    """`replicate run --scheduler` sends a notebook's trials there."""
-    cells = [
-        new_code_cell('out = "x"\nseed = 5', metadata={"tags": ["parameters"]}, id="a"),
-        new_code_cell(
-            "import os\nfrom pathlib import Path\n"
-            "from replication import Maze, demonstrate\n"
-            "from replication.paper.params import Params\n"
-            "from replication.trials.condition import Condition\n"
-            "from replication.trials.run import run_trials\n"
-            "from replication.trials.store import Store\n"
-            "maze = Maze.from_text('....G\\n.#...\\nS....')\n"
-            "params = Params.of(episodes=60, horizon=40, max_iterations=40)\n"
-            "condition = Condition(demonstrate('small', maze), 'unified', params)\n"
-            "store = Store(Path(out).parent.parent / 'trials.sqlite')\n"
-            "results = run_trials([condition], trials=3, store=store, seed=seed)\n"
-            "(Path(out) / 'curves.txt').write_text(results.errors(condition).tobytes().hex())",
-            id="b",
-        ),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {"data": ["curves.txt"]}})
-    path = tmp_path / "toy.ipynb"
-    nbformat.write(node, path)
-    address = start().address
-    found = []
-    for words in ([], ["--scheduler", address]):
-        out = tmp_path / f"out-{len(words)}"
-        code = "from replication.cli import app; app()"
-        done = subprocess.run(
-            [sys.executable, "-c", code, "run", str(path), "--out", str(out), *words],
-            capture_output=True,
-            text=True,
-            timeout=300,
-        )
-        assert done.returncode == 0, done.stderr
-        found.append((out / "toy" / "curves.txt").read_text())
-    assert found[0] == found[1]
 
 
 def test_the_cluster_of_the_manual(checkout: Checkout, reference: Reference) -> None:
@@ -198,18 +132,11 @@ def test_the_cluster_of_the_manual(checkout: Checkout, reference: Reference) -> 
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     found = re.findall(r"^ *\.venv/bin/dask (.+) &$", text.replace("8786", port), re.MULTILINE)
     commands = list(dict.fromkeys(found))
-    environment = os.environ | {
-        "FAULTS_MARK": checkout.mark,
-        "PYTHONPATH": str(checkout.folder),
-        "TMPDIR": str(checkout.scratch),
-        "TOY_NOTES": str(checkout.notes),
-        "TOY_GATE": str(checkout.gate),
-    }
     cluster = [
         subprocess.Popen(
             [sys.executable, "-m", "dask", *shlex.split(command)],
             cwd=checkout.scratch,
-            env=environment | {"TOY_PAUSE": "0.3"},
+            env=os.environ | checkout.variables | {"TOY_PAUSE": "0.3"},
             stderr=subprocess.DEVNULL,
         )
         for command in commands

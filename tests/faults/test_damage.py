@@ -11,37 +11,14 @@ import pytest
 
 from replication import Demos, demonstrate
 from replication.envs.maze import Maze
-from replication.paper.params import Params
-from replication.trials.condition import Condition
-from replication.trials.results import Results
-from replication.trials.run import run_trials
-from replication.trials.store import Store
-from tests.faults.checkout import SMALL
-
-
-def _results(demos: Demos, path: Path) -> Results:
-    conditions = [
-        Condition(demos, "unified", Params.of(episodes=60 + n, horizon=40, max_iterations=40))
-        for n in range(4)
-    ]
-    return run_trials(conditions, trials=3, store=Store(path), seed=5)
-
-
-def _bits(results: Results) -> list[bytes]:
-    return [
-        array.tobytes()
-        for condition in results.conditions
-        for k in range(results.trials)
-        for trial in [results.trial(condition, k)]
-        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
-    ]
+from tests.faults.checkout import SMALL, bits, run_few
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, list[bytes]]:
     """Return the bytes of a sound store, and what it holds."""
     path = tmp_path_factory.mktemp("sound") / "trials.sqlite"
-    found = _bits(_results(demonstrate("small", Maze.from_text(SMALL)), path))
+    found = bits(run_few(demonstrate("small", Maze.from_text(SMALL)), path, 4))
     with sqlite3.connect(path) as connection:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.close()
@@ -57,7 +34,7 @@ def test_a_damaged_store_is_set_aside(
     how: str,
 ) -> None:
     """A store that is no sound database is set aside with a message; its trials come again."""
-    content, bits = sound
+    content, expected = sound
     garbage = np.random.default_rng(1).bytes(len(content) - 8192)
     damaged = {
         "garbage": content[:4096] + garbage + content[-4096:],
@@ -67,13 +44,13 @@ def test_a_damaged_store_is_set_aside(
     }[how]
     path = tmp_path / "trials.sqlite"
     path.write_bytes(damaged)
-    assert _bits(_results(small_demos, path)) == bits
+    assert bits(run_few(small_demos, path, 4)) == expected
     assert re.search(
-        r"trials\.sqlite is damaged \(.*set aside as \S+; .*again\n", capfd.readouterr().err
+        r"trials\.sqlite is damaged \(.*set aside as \S+damaged; .*again", capfd.readouterr().err
     )
-    (aside,) = tmp_path.glob("*.damaged-*")
+    aside = path.with_name("trials.sqlite.damaged")
     assert aside.read_bytes() == damaged
-    assert _bits(_results(small_demos, path)) == bits
+    assert bits(run_few(small_demos, path, 4)) == expected
     assert capfd.readouterr().err == ""
 
 
@@ -82,13 +59,13 @@ def test_an_empty_store_is_a_new_one(
 ) -> None:
     """A file of no bytes holds nothing that could be set aside; it is filled."""
     (tmp_path / "trials.sqlite").touch()
-    assert _bits(_results(small_demos, tmp_path / "trials.sqlite")) == sound[1]
+    assert bits(run_few(small_demos, tmp_path / "trials.sqlite", 4)) == sound[1]
 
 
 def _check_random_damage(
     demos: Demos, folder: Path, sound: tuple[bytes, list[bytes]], numbers: range
 ) -> None:
-    content, bits = sound
+    content, expected = sound
     for number in numbers:
         rng = np.random.default_rng(number)
         damaged = bytearray(content)
@@ -100,7 +77,7 @@ def _check_random_damage(
         path = folder / f"{number}" / "trials.sqlite"
         path.parent.mkdir()
         path.write_bytes(damaged)
-        assert _bits(_results(demos, path)) == bits, number
+        assert bits(run_few(demos, path, 4)) == expected, number
 
 
 def test_random_damage_changes_no_result(
@@ -128,7 +105,7 @@ def test_a_damaged_record_is_computed_again(
         connection.execute("UPDATE trials SET record = x'00' WHERE rowid = 2")
         connection.execute("UPDATE trials SET record = substr(record, 1, 50) WHERE rowid = 3")
     connection.close()
-    assert _bits(_results(small_demos, path)) == sound[1]
+    assert bits(run_few(small_demos, path, 4)) == sound[1]
     with sqlite3.connect(path) as connection:
         (short,) = connection.execute("SELECT COUNT(*) FROM trials WHERE length(record) < 60")
     connection.close()

@@ -22,7 +22,6 @@ from tests.faults.checkout import (
     alive,
     drafts,
     gone,
-    notebook,
     wait,
 )
 
@@ -84,28 +83,6 @@ def test_a_hundred_kills_lose_and_repeat_nothing(
     _killed(tmp_path / "checkout", reference, kills=5, seed=100 + seed)
 
 
-def test_a_killed_kernel_is_named(checkout: Checkout) -> None:
-    """A kernel that is killed is reported with its likely cause, and earlier outputs stay."""
-    kill = "if trials < 0: import os; os.kill(os.getpid(), 9)"
-    write = "from pathlib import Path\n(Path(out) / 'a.txt').write_text(str(trials))"
-    notebook(checkout.folder / "notebooks" / "toy.ipynb", write, kill, data=["a.txt"])
-    checkout.run("run", "--out", "here")
-    error = checkout.run("run", "--out", "here", "-p", "trials", "-1", code=1).error
-    assert re.search(
-        r"toy\.ipynb: cell 3: the kernel was killed, perhaps for want of memory", error
-    )
-    assert (checkout.folder / "here" / "toy" / "a.txt").read_text() == str(TRIALS)
-    assert drafts(checkout.folder / "here") == []
-
-
-def test_a_cell_over_its_time_is_named(checkout: Checkout) -> None:
-    """A cell that takes too long is ended and named, with the way to allow it more."""
-    path = checkout.folder / "notebooks" / "toy.ipynb"
-    notebook(path, "import time\ntime.sleep(60)", data=[])
-    error = checkout.run("run", "--timeout", "8", code=1).error
-    assert error.endswith("cell 2 took more than 8 seconds; allow more with --timeout")
-
-
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_keeps_what_is_finished(
     checkout: Checkout, reference: Reference, times: int
@@ -135,7 +112,7 @@ def test_ctrl_c_keeps_what_is_finished(
     assert len(checkout.computed) == TASKS * TRIALS - len(kept)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
     """However verify is ended, so are the processes that compute for it."""
     demos = PROJECT / "data" / "demos" / "open_maze.json"
@@ -157,6 +134,7 @@ def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signa
     assert gone(checkout.mark)
 
 
+@pytest.mark.long
 def test_a_second_run_waits_for_the_first(checkout: Checkout, reference: Reference) -> None:
     """Of two runs at once, the second says that it waits, and then finds everything fresh."""
     checkout.gate.touch()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from pathlib import Path
@@ -86,26 +85,3 @@ def test_paths_with_spaces_and_accents(tmp_path: Path, reference: Reference) -> 
         assert (checkout.folder / out / "toy" / name).read_bytes() == reference.results[name]
     again = checkout.run("run", "--out", out, "-p", "demos", f"data/demos/{drive.name}")
     assert "toy: fresh" in again.out
-
-
-def test_foreign_kernels_are_not_used(checkout: Checkout, reference: Reference) -> None:
-    """Other kernels of any name, and start-up files of the user, leave a run as it is."""
-    home = checkout.scratch / "home"
-    spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
-    for place in ("path", "data", "home/.local/share/jupyter"):
-        for name in ("replication", "python3", "python"):
-            folder = checkout.scratch / place / "kernels" / name
-            folder.mkdir(parents=True)
-            (folder / "kernel.json").write_text(json.dumps(spec))
-    startup = home / ".ipython" / "profile_default" / "startup" / "00-mine.py"
-    startup.parent.mkdir(parents=True)
-    startup.write_text("raise SystemExit('foreign')")
-    checkout.environment |= {
-        "HOME": str(home),
-        "IPYTHONDIR": str(home / ".ipython"),
-        "JUPYTER_DATA_DIR": str(checkout.scratch / "data"),
-        "JUPYTER_PATH": str(checkout.scratch / "path"),
-        "JUPYTER_PREFER_ENV_PATH": "1",
-    }
-    checkout.run("run", "--jobs", "2")
-    assert checkout.results() == reference.results

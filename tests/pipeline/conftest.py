@@ -1,18 +1,16 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import execute as execution
-from replication.pipeline.notebook import Notebook
 from replication.pipeline.run import Published, run_notebooks
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 PRELUDE = "import os, sys\nfrom pathlib import Path\nfolder = Path(out)"
@@ -34,20 +32,11 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def write(project: Path) -> Write:
     """Write a notebook: a headline, the parameters cell, PRELUDE and more code cells."""
 
-    def write(
-        *code: str,
-        name: str = "toy",
-        parameters: str = PARAMETERS,
-        prose: str = "# Toy",
-        **declared: Any,
-    ) -> Path:
-        sources = (parameters, PRELUDE, *code)
-        cells = [new_markdown_cell(prose, id="head")]
-        cells += [new_code_cell(source, id=f"code-{at}") for at, source in enumerate(sources)]
-        cells[1].metadata["tags"] = ["parameters"]
-        node = new_notebook(cells=cells, metadata={"replication": declared})
-        nbformat.write(node, project / f"{name}.ipynb")
-        return project / f"{name}.ipynb"
+    def write(*code: str, name: str = "toy", **given: Any) -> Path:
+        path = project / f"{name}.ipynb"
+        given = {"parameters": PARAMETERS, "prose": "# Toy"} | given
+        write_notebook(path, PRELUDE, *code, **given)
+        return path
 
     return write
 
@@ -69,27 +58,6 @@ def run(project: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
             assert not list(out.glob(".draft-*")) + list(out.glob(".aside-*"))
 
     return run
-
-
-@pytest.fixture
-def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Run notebooks in this process, which is fast; return the names of those that began."""
-    begun: list[str] = []
-
-    def execute(notebook: Notebook, values: Mapping[str, Any], stage: Path, **_: Any) -> str:
-        begun.append(notebook.name)
-        names: dict[str, Any] = {}
-        node = notebook.load()
-        for at, cell in enumerate(node.cells):
-            if cell.cell_type == "code":
-                cell.execution_count = at
-                exec(cell.source, names)
-            if at == notebook.at:
-                names |= {**values, "out": str(stage)}
-        return str(nbformat.writes(node)) + "\n"
-
-    monkeypatch.setattr(execution, "execute", execute)
-    return begun
 
 
 @pytest.fixture

@@ -11,14 +11,16 @@ from typing import Any
 import nbformat
 import papermill
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat.v4 import new_markdown_cell
 
 from replication import files
+from replication.files import write_file
 from replication.pipeline import driver
-from replication.pipeline.execute import KERNEL, execute
+from replication.pipeline.execute import KERNEL, _environment, execute
 from replication.pipeline.notebook import NotebookError, RunError, read_notebook
 from replication.pipeline.rendering import rendered
-from replication.progress import Display
+from replication.progress import SCHEDULER, Display
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nname = "a"\njobs = 1\nstore = "build/s"\nout = "build"'
 CODE = """
@@ -44,14 +46,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def write(project: Path, *code: str, prose: str = "# Toy") -> Any:
     """Write the notebook: a headline, the parameters and code cells; return its contents."""
-    cells = [
-        new_markdown_cell(prose, id="head"),
-        new_code_cell(PARAMETERS, id="parameters", metadata={"tags": ["parameters"]}),
-        *(new_code_cell(source, id=f"code-{at}") for at, source in enumerate(code)),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {}})
-    nbformat.write(node, project / "toy.ipynb")
-    return node
+    return write_notebook(project / "toy.ipynb", *code, parameters=PARAMETERS, prose=prose)
 
 
 @pytest.fixture
@@ -61,7 +56,6 @@ def run(project: Path) -> Run:
     def run(
         stage: str = "stage", target: str = "figures/toy", timeout: int = 60, **given: Any
     ) -> bytes:
-        scheduler = given.pop("scheduler", "")
         (project / stage).mkdir(parents=True, exist_ok=True)
         with Display(1, bars=False) as display:
             text = execute(
@@ -72,7 +66,6 @@ def run(project: Path) -> Run:
                 failed=project / "failed.ipynb",
                 timeout=timeout,
                 display=display,
-                scheduler=scheduler,
             )
         return text.encode()
 
@@ -109,27 +102,6 @@ def test_executed_notebook_has_no_path_of_the_machine(run: Run, project: Path) -
     assert "PosixPath('build/quick/toy/a.txt')" in outputs["result"].data["text/plain"]
     assert 'out = "build/quick/toy"' in shown[2].source
     assert "mine" not in content
-
-
-def test_folders_outside_the_project_are_named_only(
-    run: Run, project: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where the outputs are on this machine is nobody's business."""
-    (project / "inner").mkdir()
-    monkeypatch.setattr(files, "PROJECT", project / "inner")
-    content = run().decode()
-    assert str(project) not in content
-    assert cells(content.encode())[-1].outputs[-1].data["text/plain"].count("toy/a.txt") == 1
-
-
-def test_older_notebooks_give_equal_bytes(run: Run, project: Path) -> None:
-    """A notebook of a format without cell ids is executed, too."""
-    document = json.loads((project / "toy.ipynb").read_text())
-    document["nbformat_minor"] = 4
-    for cell in document["cells"]:
-        del cell["id"]
-    (project / "toy.ipynb").write_text(json.dumps(document))
-    assert run() == run()
 
 
 # --- failures and surroundings ---------------------------------------------------------------
@@ -206,12 +178,16 @@ def test_the_kernel_is_our_interpreter(
     run: Run, project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It runs in the user's folder; foreign kernels of its name and start-up files take no part."""
-    foreign = project / "jupyter" / "kernels" / KERNEL
-    foreign.mkdir(parents=True)
     spec = {"argv": ["false"], "display_name": "foreign", "language": "python"}
-    (foreign / "kernel.json").write_text(json.dumps(spec))
-    (project / "startup.py").write_text("foreign = True")
-    monkeypatch.setenv("JUPYTER_PATH", str(project / "jupyter"))
+    for place in ("JUPYTER_PATH", "JUPYTER_DATA_DIR"):
+        monkeypatch.setenv(place, str(project / place))
+        for name in (KERNEL, "python3", "python"):
+            kernel = project / place / "kernels" / name / "kernel.json"
+            write_file(kernel, json.dumps(spec))
+    write_file(project / "startup.py", "foreign = True")
+    write_file(project / "profile_default" / "startup" / "00-mine.py", "foreign = True")
+    monkeypatch.setenv("IPYTHONDIR", str(project))
+    monkeypatch.setenv("JUPYTER_PREFER_ENV_PATH", "1")
     monkeypatch.setenv("PYTHONSTARTUP", str(project / "startup.py"))
     monkeypatch.chdir(project)
     seen = "(sys.executable, os.getcwd(), trials, name, 'foreign' in dir())"
@@ -222,21 +198,13 @@ def test_the_kernel_is_our_interpreter(
     assert json.loads(output.text) == expected
 
 
-def test_scheduler_reaches_the_notebook(
-    run: Run, project: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scheduler_reaches_the_notebook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The scheduler is the given one, else that of the user's environment, else none."""
-    write(project, "import os\nos.environ.get('REPLICATION_SCHEDULER')")
-
-    def seen(**options: Any) -> str:
-        (output,) = cells(run(**options))[-1].outputs or [None]
-        return output.data["text/plain"] if output else "None"
-
-    monkeypatch.delenv("REPLICATION_SCHEDULER", raising=False)
-    assert seen() == "None"
-    assert seen(scheduler="tcp://given:1") == "'tcp://given:1'"
-    monkeypatch.setenv("REPLICATION_SCHEDULER", "tcp://mine:1")
-    assert seen() == "'tcp://mine:1'"
+    monkeypatch.delenv(SCHEDULER, raising=False)
+    assert SCHEDULER not in _environment(tmp_path / "1", "")
+    monkeypatch.setenv(SCHEDULER, "tcp://mine:1")
+    assert _environment(tmp_path / "2", "")[SCHEDULER] == "tcp://mine:1"
+    assert _environment(tmp_path / "3", "tcp://given:1")[SCHEDULER] == "tcp://given:1"
 
 
 def test_progress_of_trials_leaves_no_trace(
@@ -257,15 +225,10 @@ def test_progress_of_trials_leaves_no_trace(
 # --- new prose in an executed notebook -------------------------------------------------------
 
 
-@pytest.fixture
-def published(run: Run, project: Path) -> Path:
-    """Execute the notebook once and publish it."""
-    (project / "published.ipynb").write_bytes(run(trials=4))
-    return project / "published.ipynb"
-
-
-def test_render_is_what_a_run_would_give(run: Run, published: Path, project: Path) -> None:
+def test_render_is_what_a_run_would_give(run: Run, project: Path) -> None:
     """Text, comments, and cells of text that come or go: rendering spares an execution."""
+    published = project / "published.ipynb"
+    published.write_bytes(run(trials=4))
     node = write(project, f"# why\n{CODE}", prose="# Labyrinth\nmore")
     node.cells[1].source = f"# So many:\n{PARAMETERS}"
     node.cells.insert(0, new_markdown_cell("Before", id="before"))
@@ -275,20 +238,3 @@ def test_render_is_what_a_run_would_give(run: Run, published: Path, project: Pat
     text = rendered(read_notebook(project / "toy.ipynb"), published)
     assert "Labyrinth" in cells(text.encode())[1].source
     assert text.encode() == run(trials=4)
-
-
-def test_render_goes_there_and_back(published: Path, project: Path) -> None:
-    """Rendered twice, also with other cells of text, an executed notebook is as it was."""
-    before = published.read_bytes()
-    node = write(project, f"{CODE}# a comment", prose="Only text")
-    node.cells[:1] = [new_markdown_cell(f"{k}", id=f"text-{k}") for k in range(2)]
-    nbformat.write(node, project / "toy.ipynb")
-    published.write_text(rendered(read_notebook(project / "toy.ipynb"), published))
-    shown = cells(published.read_bytes())
-    assert [cell.source for cell in shown if cell.cell_type == "markdown"] == ["0", "1"]
-    assert [cell.id for cell in shown][-3:] == ["parameters", "papermill-1", "code-0"]
-    assert shown[-1].source.endswith("# a comment")
-    assert shown[-1].outputs == cells(before)[-1].outputs
-    write(project, CODE)
-    published.write_text(rendered(read_notebook(project / "toy.ipynb"), published))
-    assert published.read_bytes() == before

@@ -2,17 +2,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication import files
 from replication.pipeline import inputs as inputs_module
 from replication.pipeline.inputs import Inputs, changes
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\ndemos = "demos.json"\njobs = 1\nstore = "s"\nout = "build"'
 CODE = "from replication.learning.seeds import trial_seeds\nvalue = trials  # as given"
@@ -35,19 +35,11 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def write(project: Path) -> Write:
     """Write a notebook and read it: a headline, the parameters and code cells."""
 
-    def write(
-        *code: str,
-        name: str = "toy",
-        parameters: str = PARAMETERS,
-        prose: str = "# Toy",
-        **declared: Any,
-    ) -> Notebook:
-        cells = [new_markdown_cell(prose), new_code_cell(parameters)]
-        cells[1].metadata["tags"] = ["parameters"]
-        cells += [new_code_cell(source) for source in code or (CODE,)]
-        metadata = {"replication": {"data": ["a.csv"], "inputs": ["choices.toml"]} | declared}
-        nbformat.write(new_notebook(cells=cells, metadata=metadata), project / f"{name}.ipynb")
-        return read_notebook(project / f"{name}.ipynb")
+    def write(*code: str, **given: Any) -> Notebook:
+        declared = {"data": ["a.csv"], "inputs": ["choices.toml"]}
+        given = {"parameters": PARAMETERS, "prose": "# Toy"} | declared | given
+        write_notebook(project / "toy.ipynb", *code or (CODE,), **given)
+        return read_notebook(project / "toy.ipynb")
 
     return write
 
@@ -163,9 +155,13 @@ def test_code_that_python_cannot_read_has_inputs(write: Write) -> None:
 def test_cells_are_told_apart(write: Write) -> None:
     """The same lines in other cells are other code, since each cell has outputs of its own."""
     whole = "x = 1\n\n\ndef f(): pass"
-    assert changes(
-        known(inputs_of(write(whole), {})), inputs_of(write(*whole.split("\n\n\n")), {})
-    ) == ["the notebook's code has changed"]
+    before = known(inputs_of(write(whole), {}))
+    notebook = write(*whole.split("\n\n\n"))
+    assert changes(before, inputs_of(notebook, {})) == ["the notebook's code has changed"]
+    before = known(inputs_of(notebook, {}))
+    text, parameters, first, second = notebook.cells
+    moved = replace(notebook, cells=(text, first, parameters, second), at=2)
+    assert changes(before, inputs_of(moved, {})) == ["the notebook's code has changed"]
 
 
 def test_any_file_that_a_parameter_names_counts(write: Write, project: Path) -> None:

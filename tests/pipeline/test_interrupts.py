@@ -7,9 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook
+
+from tests.notebooks import write_notebook
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 
@@ -34,18 +34,12 @@ def marked(mark: Path) -> list[int]:
     return found
 
 
-def interrupted(project: Path, seconds: float, *, starting: bool) -> None:
+def interrupted(
+    project: Path, seconds: float, *, starting: bool, number: int = signal.SIGINT
+) -> None:
     """Interrupt a run some seconds after its cell or driver has begun; check how it ends."""
-    cells = [
-        new_code_cell('out = "x"', metadata={"tags": ["parameters"]}),
-        new_code_cell(
-            f"import time\nfrom pathlib import Path\nPath({str(project / 'begun')!r}).touch()\n"
-            "time.sleep(300)"
-        ),
-    ]
-    node = new_notebook(cells=cells, metadata={"replication": {}})
-    project.mkdir()
-    nbformat.write(node, project / "sleep.ipynb")
+    begin = f"from pathlib import Path\nPath({str(project / 'begun')!r}).touch()"
+    write_notebook(project / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(300)")
     (project / "environment.lock").touch()
     scratch = project / "scratch"
     scratch.mkdir()
@@ -63,40 +57,32 @@ def interrupted(project: Path, seconds: float, *, starting: bool) -> None:
         time.sleep(0.001)
     time.sleep(seconds)
     started = marked(scratch)
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=120)[1]
-    assert process.returncode == 130, said
-    assert len(said.splitlines()) == 1, said
-    assert said.startswith("error: interrupted; ")
+    process.send_signal(number)
+    shown = process.communicate(timeout=120)[1]
+    assert process.returncode == 130, shown
+    assert len(shown.splitlines()) == 1, shown
+    assert shown.startswith("error: interrupted; ")
     assert started
     assert not marked(scratch)
     assert list(scratch.iterdir()) == []
 
 
-def check_cells(folder: Path, moments: list[float]) -> None:
-    """Interrupt a cell that is running."""
-    for moment in moments:
-        interrupted(folder / f"{moment:.3f}", moment, starting=False)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_cell_that_runs_is_ended(tmp_path: Path, number: int) -> None:
+    """Ctrl-C, or a polite kill, leaves one line, and neither processes nor files."""
+    interrupted(tmp_path / "toy", 0.5, starting=False, number=number)
 
 
-def check_starts(folder: Path, moments: list[float]) -> None:
-    """Interrupt a run some seconds after its driver was started."""
-    for moment in moments:
-        interrupted(folder / f"{moment:.3f}", moment, starting=True)
-
-
-def test_a_cell_that_runs_is_ended(tmp_path: Path) -> None:
-    """Ctrl-C while a cell runs leaves one line, and neither processes nor files."""
-    check_cells(tmp_path, [0, 0.96])
-
-
-def test_a_run_that_starts_is_ended(tmp_path: Path) -> None:
-    """Ctrl-C while driver and kernel start leaves one line, and neither processes nor files."""
-    check_starts(tmp_path, [0, 0.5, 1.5, 3])
+@pytest.mark.parametrize("moment", [0, 1.5])
+def test_a_run_that_starts_is_ended(tmp_path: Path, moment: float) -> None:
+    """So does Ctrl-C while driver and kernel start."""
+    interrupted(tmp_path / "toy", moment, starting=True)
 
 
 @pytest.mark.long
 def test_interruptions_at_many_moments(tmp_path: Path) -> None:
     """The same at many more moments."""
-    check_cells(tmp_path, [0.85 + 0.01 * k for k in range(21)])
-    check_starts(tmp_path, [0.2 * k for k in range(25)])
+    for k in range(21):
+        interrupted(tmp_path / f"cell-{k}", 0.85 + 0.01 * k, starting=False)
+    for k in range(25):
+        interrupted(tmp_path / f"start-{k}", 0.2 * k, starting=True)

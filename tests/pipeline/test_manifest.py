@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from replication.pipeline import manifest
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.manifest import (
     damaged,
     output_hash,
@@ -15,7 +16,6 @@ from replication.pipeline.manifest import (
     state_of,
     write_manifest,
 )
-from replication.pipeline.notebook import MANIFEST
 
 INPUTS: dict[str, Any] = {
     "cells": "0",
@@ -132,7 +132,7 @@ def test_versions_are_named_in_neutral_words() -> None:
 )
 def test_a_record_that_cannot_be_used_counts_as_none(tmp_path: Path, entry: str) -> None:
     """A run that lacks what is shown is not known, and the others are."""
-    manifest.record_run(tmp_path, "b", {"seconds": 1, "finished": "2020-01-01T00:00:00+00:00"})
+    manifest.record_run(tmp_path, "b", 1)
     path = tmp_path / manifest.RUNS
     path.write_text(path.read_text().replace("{", f'{{"a": {entry}, ', 1))
     assert list(manifest.read_runs(tmp_path)) == ["b"]

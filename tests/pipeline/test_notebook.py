@@ -5,11 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication.pipeline.notebook import NotebookError, read_notebook
+from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
 
@@ -21,12 +20,8 @@ def write(tmp_path: Path) -> Write:
     """Write a notebook: a headline, the parameters cell, and declarations."""
 
     def write(*, parameters: str = PARAMETERS, **declared: Any) -> Path:
-        cells = [new_markdown_cell("# Toy"), new_code_cell(parameters)]
-        cells[1].metadata["tags"] = ["parameters"]
-        node = new_notebook(cells=cells, metadata={"replication": declared})
-        path = tmp_path / "toy.ipynb"
-        nbformat.write(node, path)
-        return path
+        write_notebook(tmp_path / "toy.ipynb", parameters=parameters, prose="# Toy", **declared)
+        return tmp_path / "toy.ipynb"
 
     return write
 

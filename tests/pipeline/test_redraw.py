@@ -99,11 +99,12 @@ def test_single_figures_are_redrawn(out: Path, redrawn: Redraw) -> None:
         redrawn("aa")
 
 
-def test_a_table_that_was_edited_is_not_drawn(out: Path, redrawn: Redraw) -> None:
+@pytest.mark.parametrize("file", ["a.csv", "notebook.ipynb"])
+def test_what_was_edited_is_not_drawn(out: Path, redrawn: Redraw, file: str) -> None:
     """What is drawn is what the run has written, or nothing."""
-    (out / "na" / "a.csv").write_text("mine")
+    (out / "na" / file).write_text("mine")
     before = content(out)
-    with pytest.raises(NotebookError, match=r"a\.csv: is changed since its run.*run na$"):
+    with pytest.raises(NotebookError, match=rf"{file}: is changed since its run.*run na$"):
         redrawn("a", style="new")
     assert content(out) == before
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from replication import files
 from replication.pipeline.notebook import Notebook, read_notebook
-from replication.pipeline.rendering import as_text, link_players, rendered
+from replication.pipeline.rendering import as_text, clean, link_players, read_executed, rendered
 
 PICTURE = base64.b64encode(b"\x89PNG one").decode()
 
@@ -58,6 +60,44 @@ def test_players_are_links(executed: Path) -> None:
     assert outputs[1].data == {"text/markdown": "[it moves](player.html)"}
     assert outputs[1].metadata == before[1].metadata
     assert [outputs[at] for at in (0, 2, 3)] == [before[at] for at in (0, 2, 3)]
+
+
+def test_what_differs_between_equal_runs_goes(tmp_path: Path) -> None:
+    """New cells, and those of a format without ids, have ids by their places; no time is left."""
+    document = new_notebook(cells=[parameters()], metadata={"replication": {}})
+    document.nbformat_minor = 4
+    del document.cells[0]["id"]
+    (tmp_path / "source.ipynb").write_text(json.dumps(document))
+    source = read_notebook(tmp_path / "source.ipynb")
+
+    def run() -> str:
+        node = nbformat.v4.upgrade(source.load())  # which makes random ids
+        node.cells.append(new_code_cell("1", metadata={"papermill": {"duration": 1}, "tags": []}))
+        node.metadata["papermill"] = {"start_time": 1}
+        return as_text(clean(source, node))
+
+    assert run() == run()
+    assert "papermill-2" in run()
+    assert "time" not in run()
+
+
+def test_folders_are_named_for_everybody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stage is named as its target: from the project on, or by its name if it lies elsewhere."""
+    monkeypatch.setattr(files, "PROJECT", tmp_path / "project")
+    cell = new_code_cell(f"# {tmp_path / 'stage' / 'a.txt'}")
+    nbformat.write(new_notebook(cells=[cell]), tmp_path / "executed.ipynb")
+    for target, shown in (("project/build/toy", "build/toy"), ("elsewhere/toy", "toy")):
+        folders = {tmp_path / "stage": tmp_path / target}
+        node = read_executed(tmp_path / "executed.ipynb", folders)
+        assert node.cells[0].source == f"# {shown}/a.txt"
+
+
+def test_links_lead_out_of_the_published_folder(tmp_path: Path) -> None:
+    """A published notebook lies one folder deeper than its source, and so do links of its text."""
+    source = notebook(tmp_path, new_markdown_cell("[a](../b.toml) [c](d)"), parameters())
+    assert source.load().cells[0].source == "[a](../../b.toml) [c](d)"
+    assert source.shows(as_text(source.load()))
+    assert not source.shows(source.text)
 
 
 def test_shows_tells_text_apart(executed: Path, tmp_path: Path) -> None:

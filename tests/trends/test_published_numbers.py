@@ -19,7 +19,8 @@ from replication.evidence.verdicts import judge_claims, judged_trials, read_tria
 from replication.files import PROJECT
 from replication.irl import READINGS
 from replication.paper.published import PUBLISHED
-from replication.pipeline.notebook import MANIFEST, read_notebook
+from replication.pipeline.declaration import MANIFEST
+from replication.pipeline.notebook import read_notebook
 from replication.pipeline.plan import prepare
 from replication.report.readable import markdown, readable_verdicts
 from replication.trials.measures import measure_trials

@@ -1,0 +1,23 @@
+"""Small notebooks for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+
+def write_notebook(
+    path: Path, *code: str, parameters: str = 'out = "x"', prose: str = "", **declared: Any
+) -> Any:
+    """Write a notebook: text, the parameters cell and cells of code; return its contents."""
+    cells = [new_markdown_cell(prose, id="head")] if prose else []
+    tagged = {"tags": ["parameters"]}
+    cells.append(new_code_cell(parameters, id="parameters", metadata=tagged))
+    cells += [new_code_cell(source, id=f"code-{at}") for at, source in enumerate(code)]
+    node = new_notebook(cells=cells, metadata={"replication": declared})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    nbformat.write(node, path)
+    return node
