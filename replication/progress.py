@@ -130,9 +130,15 @@ class Display:
         Number of notebooks to come.
     bars
         Whether to draw bars on stderr; otherwise trials are reported as lines there.
+
+    Attributes
+    ----------
+    computed
+        How many trials the notebook that is running has computed.
     """
 
     def __init__(self, notebooks: int, *, bars: bool) -> None:
+        self.computed = 0
         self._bars = bars
         self._began = 0
         self._trials: TrialBar | None = None
@@ -149,6 +155,7 @@ class Display:
 
     def begin(self, name: str) -> None:
         """Name the notebook that is running."""
+        self.computed = 0
         self._notebooks.set_description(name)
 
     def end(self) -> None:
@@ -167,6 +174,7 @@ class Display:
             self._began = began
             self._trials = TrialBar(total, shown=self._bars, lines=not self._bars, position=1)
         if trials > self._trials.trials:
+            self.computed += trials - self._trials.trials
             self._trials.update(trials - self._trials.trials, steps - self._trials.steps)
 
     def _close_trials(self) -> None:

@@ -73,7 +73,8 @@ def label(name: str, heading: str) -> str:
 def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str) -> str:
     """Return the section of a notebook, in the order in which it shows its outputs.
 
-    Where this machine has no record of the run, the run time is the one that the page states.
+    Where this machine has no record of a run that computed trials, the run time is the one that the
+    page states.
     """
     stems: dict[str, list[str]] = {}
     for name in sorted(manifest["outputs"].keys() - {EXECUTED}):
@@ -89,9 +90,11 @@ def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str)
         if name == "seed" or name.endswith("trials")
     ]
     title = f"## [{notebook}]({notebook}/{EXECUTED})\n\n"
-    if run := read_runs(out).get(notebook):
+    run = read_runs(out).get(notebook)
+    stated = re.search(rf"{re.escape(title)}.*(run time .+)", before)
+    if run and (run.get("computed") or not stated):
         facts.append(f"run time {_time(run['seconds'])}")
-    elif stated := re.search(rf"{re.escape(title)}.*(run time .+)", before):
+    elif stated:
         facts.append(stated[1])
     rows = [
         _row(notebook, label(stem, shown.get(stem, "")), stems[stem])

@@ -187,7 +187,7 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
             reason = error.strerror or str(error)  # the path of a draft would not help the user
             raise RunError(f"{notebook.path}: cannot publish to {run.out}: {reason}") from error
     seconds = time.monotonic() - began
-    record_run(run.out, run.name, seconds)
+    record_run(run.out, run.name, seconds, options["display"].computed)
     failed.unlink(missing_ok=True)
     number = len(notebook.declared.outputs)
     compared = "" if differ is None else "; all bytes as before"

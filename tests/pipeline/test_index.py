@@ -54,12 +54,13 @@ def test_each_output_has_a_row(out: Path) -> None:
 
 
 def test_a_run_time_is_kept_where_none_is_recorded(out: Path) -> None:
-    """A fresh clone does not know how long a run took, but the page does."""
+    """A fresh clone, or a run that only read finished trials, does not know how long they took."""
     record = json.loads((out / RUNS).read_text())
-    record["toy"]["seconds"] = 754.4
-    (out / RUNS).write_text(json.dumps(record))
-    write_index(out)
-    assert lines(out)[1] == "seed 1, trials 3, run time 13 min"
+    for computed in (3, 0):
+        record["toy"] |= {"seconds": 754.4 if computed else 1.0, "computed": computed}
+        (out / RUNS).write_text(json.dumps(record))
+        write_index(out)
+        assert lines(out)[1] == "seed 1, trials 3, run time 13 min"
     (out / RUNS).unlink()
     write_index(out)
     assert lines(out)[1] == "seed 1, trials 3, run time 13 min"
