@@ -54,7 +54,7 @@ def kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "if trials == 0: raise ValueError('no trials')\n"
         "(Path(out) / 'seen.md').write_text(f'| {trials} | {name!r} | {seed} | {jobs} |')"
     )
-    declared = {"data": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
+    declared: dict[str, Any] = {"data": ["seen.md"], "profiles": {"quick": {"trials": 2}}}
     parameters = 'out = "x"\ntrials = 3\nname = "a"\nseed = 1\njobs = 1'
     toy = tmp_path / "notebooks" / "toy.ipynb"
     write_notebook(toy, code, parameters=parameters, **declared)

@@ -6,6 +6,7 @@ import re
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -28,7 +29,7 @@ def project(toy_project: Path) -> Path:
 def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "# Maze") -> Path:
     """Write a notebook with a figure, a table and a file of data."""
     declared = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
-    given = {"parameters": 'trials = 3\nout = "x"', "prose": prose} | declared
+    given: dict[str, Any] = {"parameters": 'trials = 3\nout = "x"', "prose": prose} | declared
     write_notebook(project / f"{name}.ipynb", code, **given)
     return project / f"{name}.ipynb"
 
