@@ -59,8 +59,8 @@ def label(name: str, heading: str) -> str:
 
     Examples
     --------
-    >>> label("fig05", ""), label("fig09_errors", ""), label("table2", ""), label("sets", "Sets")
-    ('Fig. 5', 'Fig. 9, errors', 'Table II', 'Sets')
+    >>> label("fig05", ""), label("fig09_errors", ""), label("table4", ""), label("sets", "Sets")
+    ('Fig. 5', 'Fig. 9, errors', 'Table IV', 'Sets')
     """
     match = re.fullmatch(r"(fig|table)0*(\d+)(?:_(\w+))?", name)
     if match is None:

@@ -10,7 +10,7 @@ import pytest
 from nbformat.v4 import new_output
 
 from replication.pipeline import execute as execution
-from replication.pipeline.index import INDEX, label, shown_outputs, write_index
+from replication.pipeline.index import INDEX, shown_outputs, write_index
 from replication.pipeline.manifest import RUNS
 from replication.pipeline.run import run_notebooks
 
@@ -80,12 +80,3 @@ def test_what_is_shown_comes_with_its_heading(out: Path) -> None:
     """The nearest heading above an output is its own."""
     shown = [(entry["name"], heading) for entry, heading in shown_outputs(out / "toy")]
     assert shown == [("fig05", "Which mistakes help"), ("sets", "Which mistakes help")]
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [("fig12", "Fig. 12"), ("table1", "Table I"), ("table4", "Table IV"), ("figure", "figure")],
-)
-def test_names_of_the_paper_are_read(name: str, text: str) -> None:
-    """A figure or table of the paper has the paper's name."""
-    assert label(name, "") == text

@@ -28,10 +28,9 @@ def project(toy_project: Path) -> Path:
 
 def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "# Maze") -> Path:
     """Write a notebook with a figure, a table and a file of data."""
-    declared: dict[str, Any] = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
-    parameters = 'trials = 3\nout = "x"'
-    path = project / f"{name}.ipynb"
-    write_notebook(path, code, parameters=parameters, prose=prose, **declared)
+    declared = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
+    given: dict[str, Any] = {"parameters": 'trials = 3\nout = "x"', "prose": prose} | declared
+    write_notebook(project / f"{name}.ipynb", code, **given)
     return project / f"{name}.ipynb"
 
 
