@@ -34,7 +34,7 @@ if trials in (2, 3):
 """
 
 
-@pytest.mark.parametrize("trials", [1, 2, 3])
+@pytest.mark.parametrize("trials", [1, pytest.param(2, marks=pytest.mark.long), 3])
 def test_a_full_disk_leaves_the_old_output(checkout: Checkout, trials: int) -> None:
     """Where a cell, publishing or the executed notebook finds no room, nothing is half-written."""
     notebook(checkout.folder / "notebooks" / "toy.ipynb", FILL, data=["a.txt"])

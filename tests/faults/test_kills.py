@@ -70,8 +70,8 @@ def _killed(folder: Path, reference: Reference, *, kills: int, seed: int) -> Non
 
 
 def test_kills_lose_and_repeat_nothing(tmp_path: Path, reference: Reference) -> None:
-    """After five kills a run gives the undisturbed bytes and computes only what was not stored."""
-    _killed(tmp_path / "checkout", reference, kills=5, seed=1)
+    """After three kills a run gives the undisturbed bytes and computes only what was not stored."""
+    _killed(tmp_path / "checkout", reference, kills=3, seed=1)
 
 
 @pytest.mark.long
@@ -83,7 +83,7 @@ def test_a_hundred_kills_lose_and_repeat_nothing(
     _killed(tmp_path / "checkout", reference, kills=5, seed=100 + seed)
 
 
-@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_ctrl_c_keeps_what_is_finished(
     checkout: Checkout, reference: Reference, times: int
 ) -> None:
