@@ -284,13 +284,20 @@ def test_check_answers_by_its_exit_code(project: Path) -> None:
     ],
 )
 def test_bad_plans_are_refused_before_any_notebook_runs(
-    monkeypatch: pytest.MonkeyPatch, module: Any, old: str, new: str, message: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: Any,
+    old: str,
+    new: str,
+    message: str,
 ) -> None:
     """A mistake in the claims or specifications is found by the check of the file."""
     name = module.__name__.rpartition(".")[2]
-    text = module._text()
+    text = module.FILE.read_text(encoding="utf-8")
     assert old in text
-    monkeypatch.setattr(module, "_text", lambda: text.replace(old, new, 1))
+    slipped = tmp_path / "slipped.toml"
+    slipped.write_text(text.replace(old, new, 1), encoding="utf-8")
+    monkeypatch.setattr(module, "FILE", slipped)
     cached = claims.load_claims if module is claims else specifications.load_specifications
     cached.cache_clear()
     try:
