@@ -73,8 +73,8 @@ def label(name: str, heading: str) -> str:
 def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str) -> str:
     """Return the section of a notebook, in the order in which it shows its outputs.
 
-    Where this machine has no record of a run that computed trials, the run time is the one that the
-    page states.
+    The run time of a notebook with trials is that of a run that computed some. Where this machine
+    has no record of one, it is what the page states, if anything.
     """
     stems: dict[str, list[str]] = {}
     for name in sorted(manifest["outputs"].keys() - {EXECUTED}):
@@ -92,7 +92,8 @@ def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str)
     title = f"## [{notebook}]({notebook}/{EXECUTED})\n\n"
     run = read_runs(out).get(notebook)
     stated = re.search(rf"{re.escape(title)}.*(run time .+)", before)
-    if run and (run.get("computed") or not stated):
+    counts_trials = any(name.endswith("trials") for name in parameters)
+    if run and (run.get("computed") or not counts_trials):
         facts.append(f"run time {_time(run['seconds'])}")
     elif stated:
         facts.append(stated[1])
