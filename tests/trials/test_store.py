@@ -171,7 +171,8 @@ def test_a_batch_that_fails_half_way_stores_nothing(store_path: Path) -> None:
 
 
 def test_other_threads_may_read_and_write(store_path: Path) -> None:
-    """Stores that threads open and fill at the same time lose nothing."""
+    """Threads that open a store and fill it at the same time lose nothing."""
+    Store(store_path)  # SQLite does not wait for whoever is making the file
     keys = [f"{k}" for k in range(40)]
 
     def write(some: list[str]) -> None:
