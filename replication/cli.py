@@ -12,6 +12,7 @@ import json
 import math
 import os
 import re
+import secrets
 import shlex
 import shutil
 import signal
@@ -160,6 +161,9 @@ def demos_group() -> None:
 @number("--seed", 0, "Root seed; the notebook's by default.")
 @folder("Where the outputs go.")
 @number("--timeout", 1, "Time that one cell may take.", default=3600, metavar="SECONDS")
+@click.option(
+    "--publish", is_flag=True, help="Replace what is published in figures, although it was edited."
+)
 @click.option("--force", is_flag=True, help="Re-run everything, and recompute every trial.")
 @click.option(
     "--here", is_flag=True, help="Also re-run notebooks whose outputs were made on another machine."
@@ -178,6 +182,7 @@ def run(
     profile: str,
     seed: int | None,
     out: Path | None,
+    publish: bool,
     force: bool,
     check: bool,
     parameters: dict[str, Any],
@@ -187,26 +192,30 @@ def run(
 
     A notebook is skipped if nothing that its outputs depend on has changed. Outputs go to figures;
     those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
-    and store) to build/custom.
+    and store) to build/custom. If a notebook, its data or the code was edited since its outputs
+    were published, they go to build/edited unless --publish is given.
     """
-    from replication.pipeline.folders import outputs_folder
     from replication.pipeline.notebook import RunError
-    from replication.pipeline.plan import run_name
-    from replication.pipeline.run import run_notebooks
+    from replication.pipeline.run import destination, run_notebooks
 
     _catch_signals()
-    paths = [_notebook(name) for name in notebooks] or _all_notebooks()
-    target = out or outputs_folder(run_name(profile, seed=seed, parameters=parameters))
+    named = [_notebook(name) for name in notebooks] or _all_notebooks()
+    paths = list(dict.fromkeys(named))
+    asked: dict[str, Any] = {"profile": profile, "seed": seed, "parameters": parameters}
+    target, why = (out, "") if out else destination(paths, publish=publish, **asked)
+    if why and check:
+        raise UserError(f"{why}; so there is nothing to --check against")
+    if why:
+        click.echo(f"{why}: the outputs of this run go to {_short(target)}")
     try:
         published = run_notebooks(
-            list(dict.fromkeys(paths)),
-            profile=profile,
+            paths,
             out=target,
-            seed=seed,
-            parameters=parameters,
+            publish=publish,
             force=force,
             checks=CHECKS,
             echo=click.echo,
+            **asked,
             **options,
         )
     except KeyboardInterrupt:
@@ -303,42 +312,80 @@ def status(profile: str, out: Path | None) -> None:
     click.echo("\n".join(status_lines(*_prepared(profile, out), options)))
 
 
-@app.command(epilog="Example: replicate verify")
+@app.command(epilog="Example: replicate verify open_maze")
+@click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
 @outputs_options
 @jobs_option
-def verify(profile: str, out: Path | None, jobs: int | None) -> None:
-    """Prove the outputs: hash the files, check the packages, recompute one trial in twenty.
+@number("--every", 1, "Recompute one trial in so many.", default=20)
+@number("--seed", 0, "Of the sample of trials; drawn anew by default.")
+@number("--timeout", 1, "Time that one cell may take.", default=3600, metavar="SECONDS")
+def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None:
+    """Prove the outputs of notebooks, by default of all.
 
-    Exit code 0 if everything agrees, else 1.
+    What should be there follows from the notebooks and environment.lock. Each notebook is executed
+    again with its published trials, and must give the same bytes. Of the trials, a random sample is
+    computed again from nothing. Exit code 0 if everything agrees, else 1.
     """
     import joblib
 
     _catch_signals()
-    wrong = list(_disagreements(profile, out, jobs or joblib.cpu_count()))
-    for line in wrong:
+    names = [_notebook(name).stem for name in notebooks]
+    number = 0
+    for line in _disagreements(names, jobs=jobs or joblib.cpu_count(), **options):
+        number += 1
         click.echo(f"error: {line}", err=True)
-    click.echo("everything agrees" if not wrong else f"{len(wrong)} things do not agree")
-    sys.exit(int(bool(wrong)))
+    click.echo("everything agrees" if not number else f"{number} things do not agree")
+    sys.exit(int(number > 0))
 
 
-def _disagreements(profile: str, out: Path | None, jobs: int) -> Iterator[str]:
+def _disagreements(
+    names: Sequence[str],
+    *,
+    profile: str,
+    out: Path | None,
+    jobs: int,
+    every: int,
+    seed: int | None,
+    timeout: int,
+) -> Iterator[str]:
     """Check everything; say what is being done, and yield what is wrong."""
-    from replication.evidence.recompute import EVERY, recompute_trials
-    from replication.pipeline.verify import verify_inputs, verify_outputs, verify_packages
+    from replication.evidence.recompute import recompute_trials
+    from replication.pipeline import verify
+    from replication.pipeline.declaration import TRIALS
 
-    runs, target = _prepared(profile, out)
-    click.echo(f"hashing the outputs in {target.name} and what they depend on")
-    yield from verify_outputs(target)
-    yield from verify_inputs(runs, target)
+    every_run, target = _prepared(profile, out)
+    runs = [run for run in every_run if not names or run.name in names]
     click.echo("comparing the installed packages with environment.lock")
-    yield from verify_packages(files.PROJECT / "environment.lock")
+    yield from verify.verify_packages(files.PROJECT / "environment.lock")
+    click.echo(f"comparing what is in {target.name} with what the notebooks declare")
+    yield from verify.verify_folder(every_run, target)
+    sound = []
+    for run in runs:
+        wrong = list(verify.verify_records(run))
+        yield from wrong
+        sound += [] if wrong else [run]
+    for run in sound:
+        with tempfile.TemporaryDirectory(prefix="replicate-") as scratch:
+            yield from verify.verify_outputs(
+                run, Path(scratch).resolve(), timeout=timeout, echo=click.echo
+            )
+    root = secrets.randbits(32) if seed is None else seed
 
     def report(number: int) -> None:
-        if number:
-            click.echo(f"recomputing {number} trials, one in {EVERY}")
+        click.echo(f"recomputing {number} trials, one in {every}, drawn with --seed {root}")
 
-    store = files.PROJECT / "build" / "trials.sqlite"
-    yield from recompute_trials(target, store, jobs=jobs, report=report)
+    yield from recompute_trials(
+        {
+            f"{run.name}/{TRIALS}": run.folder / TRIALS
+            for run in sound
+            if run.notebook.declared.trials
+        },
+        files.PROJECT / "build" / "trials.sqlite",
+        seed=root,
+        every=every,
+        jobs=jobs,
+        report=report,
+    )
 
 
 @app.command(epilog="Example: replicate clean --dry-run")

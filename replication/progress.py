@@ -23,6 +23,9 @@ EVENTS = "REPLICATION_EVENTS"
 SCHEDULER = "REPLICATION_SCHEDULER"
 """Environment variable with the address of a Dask scheduler that trials are sent to."""
 
+GIVEN = "REPLICATION_GIVEN"
+"""Environment variable with the folder of a table of trials that is read instead of computed."""
+
 PAUSE = 0.1
 """Seconds between two reports of a kernel."""
 

@@ -8,6 +8,8 @@ from typing import Any
 import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
+from replication.pipeline.manifest import damaged, published_folders
+
 
 def write_notebook(
     path: Path, *code: str, parameters: str = 'out = "x"', prose: str = "", **declared: Any
@@ -21,3 +23,12 @@ def write_notebook(
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(node, path)
     return node
+
+
+def damage(out: Path) -> list[str]:
+    """Return the published files in a folder that are not as their manifests have them."""
+    return [
+        f"{name}/{output} is {how}"
+        for name, manifest in published_folders(out).items()
+        for output, how in damaged(out / name, manifest).items()
+    ]

@@ -7,12 +7,10 @@ nearest to its published mean and SD on the open maze. ``choices.toml`` states t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from replication.demos.maze_expert import Expert, demonstrate
 from replication.envs.maze import Maze
@@ -21,7 +19,7 @@ from replication.paper.params import Params
 from replication.paper.published import TABLE_1, Published
 from replication.paper.register import Value, load_choices
 from replication.trials.condition import Condition
-from replication.trials.results import Results
+from replication.trials.table import Group
 
 CALIBRATED = ("DEMO-SHAPE", "ALPHA", "F-START", "TIES")
 """The choices that were calibrated."""
@@ -82,21 +80,30 @@ def kl_divergence(mean: float, sd: float, published: Published) -> float:
     return float(np.log(sd / published.sd) + spread / (2 * sd**2) - 0.5)
 
 
-def calibration_table(results: Results, conditions: Mapping[Point, Condition]) -> pd.DataFrame:
+def plan(maze: Maze, trials: int) -> list[Group]:
+    """Return what is run: a group for each point, with "grid" and its place as columns."""
+    return [
+        Group([condition], trials, {"part": "grid", "number": number})
+        for number, condition in enumerate(grid_conditions(maze).values())
+    ]
+
+
+def calibration_table(trials: pd.DataFrame) -> pd.DataFrame:
     """Return one row a point, the nearest first, with its mean, SD and divergence."""
     rows = []
-    for point, condition in conditions.items():
-        ours = summarise(results.iterations(condition), results.converged(condition))
+    points = grid()
+    for number, own in trials.groupby("number"):
+        ours = summarise(own["iterations"], own["converged"])
         rows.append(
             {
-                **dict(zip(CALIBRATED, point, strict=True)),
+                **dict(zip(CALIBRATED, points[number], strict=True)),
                 "n": ours.n,
                 "capped": ours.capped,
                 "mean": ours.mean,
                 "sd": ours.sd,
                 "median": ours.median,
                 "kl_divergence": kl_divergence(ours.mean, ours.sd, PAIR),
-                "default": point == chosen(),
+                "default": points[number] == chosen(),
                 "paper_mean": PAIR.mean,
                 "paper_sd": PAIR.sd,
             }
@@ -104,15 +111,16 @@ def calibration_table(results: Results, conditions: Mapping[Point, Condition]) -
     return pd.DataFrame(rows).sort_values("kl_divergence", kind="stable", ignore_index=True)
 
 
-def check_table(grid_counts: NDArray[np.int64], trials: pd.DataFrame) -> pd.DataFrame:
+def check_table(grid_trials: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
     """Return how near the chosen point comes to the pair: in the grid, and in new trials.
 
-    One row for its trials in the grid, `[trial]`, and one for the judged trials of the open maze
+    One row for its trials in the grid, and one for the judged trials of the open maze
     under each reading of Eq. 9: mean and SD with their intervals, and where both would lie if the
     trials came from the published distribution, as for the claims about published numbers.
     """
     new = trials[trials["method"] == "unified"].groupby("reading", sort=False)["iterations"]
-    runs = [("grid", "printed", grid_counts.astype(float))]
+    own = grid_trials[grid_trials["number"] == grid().index(chosen())]
+    runs = [("grid", "printed", own["iterations"].to_numpy(float))]
     runs += [("new", str(reading), rows.to_numpy(float)) for reading, rows in new]
     rows = []
     for source, reading, counts in runs:

@@ -1,100 +1,189 @@
-"""Recompute a sample of the published trials from nothing, and hold every bit against the files."""
+"""Recompute a sample of the published trials from nothing, and hold every number against the files.
+
+A row of a table of trials says which condition it belongs to, its seed and its number. From these
+the trial is computed again and measured, and the row that comes out must have the same text.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import joblib
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from replication.demos.files import load_demos
+from replication.envs.maze import as_maze
+from replication.evidence import sweep
+from replication.evidence.calibration import grid_conditions
 from replication.evidence.experiments import EXPERIMENTS, condition_of
+from replication.evidence.tables import csv_text
+from replication.files import resolve
+from replication.irl import Trial
+from replication.irl.agent import Agent
 from replication.trials.compute import compute, trial_key
+from replication.trials.condition import Condition
+from replication.trials.measures import Report, factors, trial_row
 from replication.trials.results import digest
 from replication.trials.run import workers
 from replication.trials.store import DamagedTrialError, Store
 
 EVERY = 20
-"""One trial in so many is recomputed: 5 %."""
-
-COLUMNS = (
-    *("task", "method", "reading", "set", "trial", "seed"),
-    *("iterations", "converged", "steps", "digest"),
-)
-"""The columns of a table of trials that name a trial and what came out."""
+"""One trial in so many is recomputed by default: 5 %."""
 
 
 def recompute_trials(
-    out: Path, store: Path, *, jobs: int = 1, report: Callable[[int], object] = lambda _: None
+    tables: Mapping[str, Path],
+    store: Path,
+    *,
+    seed: int,
+    every: int = EVERY,
+    jobs: int = 1,
+    report: Callable[[int], object] = lambda _: None,
 ) -> Iterator[str]:
-    """Recompute every 20th trial of each table of trials, and yield what differs.
+    """Recompute a random sample of the trials in each table, and yield what differs.
 
-    A trial is held against the digest of all its bits in the table, and against the trial in the
-    store where that has it.
+    A trial is also held against the one in the store, where that has it.
 
     Parameters
     ----------
-    out
-        Folder with the folders of the notebooks, some of which hold a trials.csv.
+    tables
+        Files of trials, by what they are called.
     store
         The store's file; it need not exist.
+    seed
+        Of the sample. Who forges a table must not know it beforehand.
+    every
+        One trial in so many is recomputed, at least one of each table.
     jobs
         Worker processes.
     report
         Told how many trials are recomputed.
     """
-    rows = []
-    for table in sorted(out.glob("*/trials.csv")):
-        file = f"{table.parent.name}/{table.name}"
+    read: dict[str, pd.DataFrame] = {}
+    for file, path in tables.items():
         try:
-            sample = sampled_trials(table)
-        except (OSError, ValueError, KeyError) as error:
+            read[file] = _read(path)
+        except (OSError, ValueError) as error:
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
             yield f"{file} cannot be read: {reason}"
-            continue
-        for row in sample.itertuples():
-            name = f"{file}: {row.method}, {row.reading or '-'}, {row.set}, trial {row.trial}"
+    rows: list[tuple[str, Condition, dict[str, str]]] = []
+    samples = sampled([len(trials) for trials in read.values()], seed, every)
+    for (file, trials), sample in zip(read.items(), samples, strict=True):
+        for at in sample:
+            row = dict(zip(trials.columns, trials.iloc[at], strict=True))
+            name = f"{file}, row {at + 1}"
             try:
-                rows.append((condition_of(row.task, row.method, row.reading, row.set), row, name))
-            except (ValueError, KeyError) as error:
-                yield f"{name}: no such condition: {error}"
+                k, root = _number(row)
+                if not 0 <= k < len(trials) or root < 0:
+                    raise ValueError("its trial or seed has an impossible number")
+                rows.append((name, declared_condition(row), row))
+            except (ValueError, LookupError) as error:
+                yield f"{name}: no such trial: {error}"
     report(len(rows))
     stored = Store(store) if store.exists() else None
+    computed = _compute([(one, *_number(row)) for _, one, row in rows], jobs)
+    for name, condition, row in rows:
+        k, root = _number(row)
+        key = trial_key(condition, root, k, traced=False)
+        now = trial_row(condition, Report(), errors="errors" in row)(computed[key], k, root)
+        (text,) = _as_text(pd.DataFrame([now])).to_dict("records")
+        columns = {*row, *text} - {"part", "number"}
+        if wrong := sorted(column for column in columns if row.get(column) != text.get(column)):
+            yield f"{name}: its trial gives another {', '.join(wrong)}"
+        if stored is not None and not _agrees(stored, condition, root, k, computed[key]):
+            yield f"{store.name}: {name}: the stored trial has other bits"
+
+
+def sampled(lengths: Sequence[int], seed: int, every: int) -> list[NDArray[np.int64]]:
+    """Return the places of one row in so many, drawn at random in each of some tables."""
+    return [
+        np.sort(np.random.default_rng(child).choice(n, -(-n // every), replace=False))
+        for n, child in zip(lengths, np.random.SeedSequence(seed).spawn(len(lengths)), strict=True)
+    ]
+
+
+def _number(row: Mapping[str, str]) -> tuple[int, int]:
+    """Return the number and the root seed of a trial."""
+    return int(row["trial"]), int(row["seed"])
+
+
+def _compute(wanted: Sequence[tuple[Condition, int, int]], jobs: int) -> dict[str, Trial]:
+    """Compute trials, given as condition, number and root seed; return them by their keys."""
+    alike: dict[tuple[Agent, int], list[tuple[Condition, int]]] = {}
+    for condition, k, root in wanted:
+        alike.setdefault((condition.agent, root), []).append((condition, k))
+    chunks = [
+        (agent, trials[at : at + agent.batch_size], root)
+        for (agent, root), trials in alike.items()
+        for at in range(0, len(trials), agent.batch_size)
+    ]
     with workers(jobs) as n:
-        work = joblib.Parallel(n_jobs=n, return_as="generator")(
-            joblib.delayed(compute)(condition.agent, [(condition, row.trial)], row.seed)
-            for condition, row, _ in rows
+        # as a list: nobody may use a condition while it is sent to a worker
+        finished = joblib.Parallel(n_jobs=n)(
+            joblib.delayed(compute)(*chunk, traced=False) for chunk in chunks
         )
-        for (condition, row, name), ((key, trial),) in zip(rows, work, strict=True):
-            now = (trial.iterations, trial.converged, trial.steps)
-            if now != (row.iterations, bool(row.converged), row.steps):
-                yield f"{name}: {now[0]} iterations and {now[2]} steps, not those there"
-            elif digest(trial) != row.digest:
-                yield f"{name}: other bits than those there"
-            assert key == trial_key(condition, row.seed, row.trial), "a trial has one key"
-            if stored is not None and not _agrees(stored, key, digest(trial)):
-                yield f"{store.name}: {name}: the stored trial has other bits"
+    return dict(pair for pairs in finished for pair in pairs)
 
 
-def sampled_trials(table: Path) -> pd.DataFrame:
-    """Return every 20th row of a table that belongs to one of the paper's experiments.
+def declared_condition(row: Mapping[str, str]) -> Condition:
+    """Return the condition that a row of a table of trials belongs to.
 
     Raises
     ------
-    OSError, ValueError, KeyError
-        If the file cannot be read, or does not hold numbered trials.
+    ValueError, LookupError
+        If there is none.
     """
-    trials = pd.read_csv(table, keep_default_na=False)[list(COLUMNS)]
-    trials = trials[trials["task"].isin(list(EXPERIMENTS))]
-    sample = trials.iloc[::EVERY].astype({"trial": int, "seed": int})
-    if not (sample["trial"].between(0, len(trials) - 1) & (sample["seed"] >= 0)).all():
-        raise ValueError("it has a trial or a seed of an impossible number")
-    return sample
+    own = {name: row[name] for name in ("task", "method", "reading", "set")}
+    if "part" not in row:
+        return condition_of(**own)
+    if int(row["number"]) < 0:
+        raise LookupError(f"there is no number {row['number']}")
+    if row["part"] == "grid":
+        conditions = [_grid()[int(row["number"])]]
+    else:
+        conditions = sweep.conditions_of(row["part"], int(row["number"]))
+    for condition in conditions:
+        if factors(condition) == own:
+            return condition
+    raise LookupError(f"{row['part']} {row['number']} has no {' '.join(own.values())}")
 
 
-def _agrees(stored: Store, key: str, expected: str) -> bool:
-    """Return whether a store has nothing under a key, or a trial with the expected digest."""
+@cache
+def _grid() -> list[Condition]:
+    demos = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    return list(grid_conditions(as_maze(demos.environment)).values())
+
+
+def _read(path: Path) -> pd.DataFrame:
+    """Return a table of trials as the text that is in it.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be read, or has no trials.
+    """
+    trials = pd.read_csv(path, dtype=str, keep_default_na=False)
+    if missing := {"task", "method", "reading", "set", "trial", "seed"} - {*trials.columns}:
+        raise ValueError(f"it has no column {min(missing)}")
+    if trials.empty:
+        raise ValueError("it has no trials")
+    return trials
+
+
+def _as_text(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table as it is read back as text."""
+    return pd.read_csv(io.StringIO(csv_text(table)), dtype=str, keep_default_na=False)
+
+
+def _agrees(stored: Store, condition: Condition, root: int, k: int, trial: Trial) -> bool:
+    """Return whether a store has no such trial, or only one with the same bits."""
+    keys = {trial_key(condition, root, k, traced=traced) for traced in (True, False)}
     try:
-        return key not in stored or digest(stored.get(key)) == expected
+        return all(digest(stored.get(key)) == digest(trial) for key in stored.known(keys))
     except DamagedTrialError:
         return False

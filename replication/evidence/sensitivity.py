@@ -7,14 +7,13 @@ reported. One file because every table here is computed from that of the effects
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from replication.evidence.claims import Claim
-from replication.evidence.experiments import Key
 from replication.evidence.specifications import (
     DEFAULT,
     Specification,
@@ -28,9 +27,6 @@ from replication.evidence.statistics import (
     share_interval,
     standard_errors,
 )
-from replication.trials.condition import Condition
-from replication.trials.measures import measure_trials
-from replication.trials.results import Results
 
 HOLDS, OPEN, REVERSED = "holds", "open", "reversed"
 """Whether an interval lies beyond the margin on the claimed side, includes it, or on the other."""
@@ -42,14 +38,13 @@ NOISE, REST = "noise", "rest"
 """What the variance of an effect is due to beside single choices."""
 
 Array = NDArray[np.float64]
-Conditions = Mapping[Specification, Mapping[Key, Condition]]
 
 
 # --- effects -------------------------------------------------------------------------------------
 
 
 def effects_table(
-    results: Results, conditions: Conditions, claims: Sequence[Claim]
+    trials: pd.DataFrame, specifications: Sequence[Specification], claims: Sequence[Claim]
 ) -> pd.DataFrame:
     """Return one row for each claim and specification: the effect, its interval, its outcome.
 
@@ -59,19 +54,17 @@ def effects_table(
 
     Parameters
     ----------
-    results
-        The trials of all conditions.
-    conditions
-        The conditions of each specification, under one reading of Eq. 9 each.
+    trials
+        The trials of each specification, under one reading of Eq. 9 each; its column `number` is
+        the specification's place among `specifications`.
+    specifications
+        In the order in which they were declared.
     claims
         What to evaluate; a specification without a claim's methods gives no row.
     """
     measured = {
-        specification: {
-            str(method): rows
-            for method, rows in measure_trials(results, run.values()).groupby("method")
-        }
-        for specification, run in conditions.items()
+        specifications[int(number)]: dict(list(rows.groupby("method")))
+        for number, rows in trials.groupby("number")
     }
     parts = []
     for claim in claims:

@@ -1,15 +1,14 @@
-"""Run the declared specifications and evaluate the claims under each of them."""
+"""Run the declared specifications, and evaluate the claims under each of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 import pandas as pd
 
-from replication.evidence.claims import Claim, load_claims
+from replication.evidence.claims import load_claims
 from replication.evidence.experiments import Key
 from replication.evidence.sensitivity import effects_table
 from replication.evidence.specifications import (
@@ -28,102 +27,135 @@ from replication.evidence.variations import (
     soccer_conditions,
 )
 from replication.trials.condition import Condition
-from replication.trials.results import Results
-from replication.trials.run import run_trials
-from replication.trials.store import Store
+from replication.trials.table import Group
 
 PLAN = load_specifications()
-MAZES = [load_claims().by_id(id) for id in PLAN.mazes.claims]
-SOCCER = [load_claims().by_id(id) for id in PLAN.soccer.claims]
+CAP = PLAN.iteration_cap
+
+Make = Callable[[Specification, int], dict[Key, Condition]]
+
+SPECIFIED: dict[str, tuple[Callable[[], Sequence[Specification]], Make]] = {
+    "mazes": (lambda: single_specifications(PLAN.mazes.single.choices), maze_conditions),
+    "factorial": (lambda: factorial_specifications(PLAN.mazes.factorial), maze_conditions),
+    "soccer": (lambda: single_specifications(PLAN.soccer.single.choices), soccer_conditions),
+}
+"""For each part of the sweep with specifications: those declared, and their conditions."""
+
+TRIALS = {
+    "mazes": PLAN.mazes.single.trials,
+    "factorial": PLAN.mazes.factorial.trials,
+    "soccer": PLAN.soccer.single.trials,
+    "ablations": PLAN.ablations.trials,
+    "numbers": PLAN.ablations.trials,
+}
+"""The parts of the sweep, and the number of trials of each condition."""
+
+CLAIMS = {"mazes": PLAN.mazes.claims, "factorial": PLAN.mazes.claims, "soccer": PLAN.soccer.claims}
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """How the declared specifications are run; each method returns a table.
+@cache
+def specifications(part: str) -> Sequence[Specification]:
+    """Return the declared specifications of a part, in their order."""
+    return SPECIFIED[part][0]()
 
-    Attributes
-    ----------
-    store, jobs, seed
-        As for :func:`replication.trials.run.run_trials`.
-    most_trials, most_specifications
-        Limits for a quick look: fewer trials of each specification, fewer specifications of a kind.
+
+@cache
+def _ablated() -> dict[Ablation, Condition]:
+    return ablation_conditions(PLAN.ablations, CAP)
+
+
+@cache
+def _numbered() -> dict[tuple[int, str], Condition]:
+    return numbered_conditions(PLAN.ablations, CAP)
+
+
+@cache
+def conditions_of(part: str, number: int) -> list[Condition]:
+    """Return the conditions of the specification, ablation or number at a place in its part.
+
+    Raises
+    ------
+    KeyError, IndexError
+        If nothing is declared there.
     """
+    if part in SPECIFIED:
+        return list(SPECIFIED[part][1](specifications(part)[number], CAP).values())
+    return [_single(part)[number]]
 
-    store: Store
-    jobs: int
-    seed: int
-    most_trials: int
-    most_specifications: int
 
-    def single(self, task: Literal["mazes", "soccer"]) -> pd.DataFrame:
-        """Return the effects with one choice changed at a time."""
-        plan, make, claims = (
-            (PLAN.mazes.single, maze_conditions, MAZES)
-            if task == "mazes"
-            else (PLAN.soccer.single, soccer_conditions, SOCCER)
+def _single(part: str) -> list[Condition]:
+    """Return the conditions of a part that has one condition at each place."""
+    if part == "ablations":
+        return list(_ablated().values())
+    return {"numbers": list(_numbered().values())}[part]
+
+
+def plan(*, most_trials: int, most_specifications: int) -> list[Group]:
+    """Return what is run: a group for each specification, ablation and number.
+
+    Its columns `part` and `number` are the part of the sweep and the place in it. The limits serve
+    a quick look: fewer trials of each condition, fewer specifications of a part.
+    """
+    places = {
+        part: range(min(len(specifications(part)), most_specifications))
+        if part in SPECIFIED
+        else range(len(_single(part)))
+        for part in TRIALS
+    }
+    return [
+        Group(
+            conditions_of(part, number),
+            min(trials, most_trials),
+            {"part": part, "number": number},
         )
-        return self._effects(single_specifications(plan.choices), make, plan.trials, claims)
-
-    def factorial(self) -> pd.DataFrame:
-        """Return the effects with all choices changed at once."""
-        plan = PLAN.mazes.factorial
-        return self._effects(factorial_specifications(plan), maze_conditions, plan.trials, MAZES)
-
-    def ablations(self) -> pd.DataFrame:
-        """Return the method with its trace switched off, and other readings of AdaBoost-IRL."""
-        conditions = ablation_conditions(PLAN.ablations, PLAN.iteration_cap)
-        return ablations_table(self._run(conditions.values(), PLAN.ablations.trials), conditions)
-
-    def numbers(self) -> pd.DataFrame:
-        """Return what ever more incorrect demonstrations save."""
-        conditions = numbered_conditions(PLAN.ablations, PLAN.iteration_cap)
-        results = self._run(conditions.values(), PLAN.ablations.trials)
-        paper = -load_claims().by_id("SAVES-OPEN").paper_effect
-        return numbers_table(results, conditions, paper=paper)
-
-    def _effects(
-        self,
-        specifications: Sequence[Specification],
-        make: Callable[[Specification, int], dict[Key, Condition]],
-        trials: int,
-        claims: Sequence[Claim],
-    ) -> pd.DataFrame:
-        conditions = {
-            specification: make(specification, PLAN.iteration_cap)
-            for specification in specifications[: self.most_specifications]
-        }
-        every = [condition for run in conditions.values() for condition in run.values()]
-        return effects_table(self._run(every, trials), conditions, claims)
-
-    def _run(self, conditions: Iterable[Condition], trials: int) -> Results:
-        return run_trials(
-            list(conditions),
-            trials=min(trials, self.most_trials),
-            store=self.store,
-            jobs=self.jobs,
-            seed=self.seed,
-            traced=False,
-        )
+        for part, trials in TRIALS.items()
+        for number in places[part]
+    ]
 
 
-def ablations_table(results: Results, conditions: Mapping[Ablation, Condition]) -> pd.DataFrame:
+def effects(trials: pd.DataFrame, part: str) -> pd.DataFrame:
+    """Return the claims' effects under each specification of a part."""
+    claims = [load_claims().by_id(id) for id in CLAIMS[part]]
+    return effects_table(trials[trials["part"] == part], specifications(part), claims)
+
+
+def ablations(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return the method with its trace switched off, and other readings of AdaBoost-IRL."""
+    names = [choices for _, _, choices in _ablated()]
+    return ablations_table(trials[trials["part"] == "ablations"], names)
+
+
+def numbers(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return what ever more incorrect demonstrations save."""
+    paper = -load_claims().by_id("SAVES-OPEN").paper_effect
+    return numbers_table(trials[trials["part"] == "numbers"], _numbered(), paper=paper)
+
+
+def ablations_table(trials: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     """Return one row a condition: a summary of its iterations, capped trials counting as the cap.
 
     `more` is the mean number of iterations more than in the first condition, over the same seeds,
     with its interval.
+
+    Parameters
+    ----------
+    trials
+        The trials of all conditions, by their `number`.
+    names
+        What each condition changes.
     """
     rows = []
-    first = results.iterations(next(iter(conditions.values())))
-    for (method, reading, choices), condition in conditions.items():
-        counts = results.iterations(condition).astype(float)
+    first = trials.loc[trials["number"] == 0, "iterations"].to_numpy(float)
+    for (number, method, reading), own in trials.groupby(["number", "method", "reading"]):
+        counts = own["iterations"].to_numpy(float)
         low, high = mean_intervals(np.stack([counts, counts - first]))
         rows.append(
             {
                 "method": method,
                 "reading": reading,
-                "choices": choices,
+                "choices": names[number],
                 "n": len(counts),
-                "capped": int((~results.converged(condition)).sum()),
+                "capped": int((own["converged"] == 0).sum()),
                 "mean": counts.mean(),
                 "low": low[0],
                 "high": high[0],
@@ -138,18 +170,30 @@ def ablations_table(results: Results, conditions: Mapping[Ablation, Condition]) 
 
 
 def numbers_table(
-    results: Results, conditions: Mapping[tuple[int, str], Condition], *, paper: float
+    trials: pd.DataFrame, conditions: Mapping[tuple[int, str], Condition], *, paper: float
 ) -> pd.DataFrame:
     """Return one row for each number of incorrect demonstrations and reading of Eq. 9.
 
     `saved` is the mean number of iterations fewer than without any, over the same seeds, with its
     interval; `paper` the published saving. `pairs` and `leaving` count the marked pairs, see
     :func:`replication.evidence.tables.pairs_near`.
+
+    Parameters
+    ----------
+    trials
+        The trials of all conditions; their column `number` is the place among the conditions.
+    conditions
+        By the number of incorrect demonstrations and the reading of Eq. 9.
+    paper
+        The published saving.
     """
     rows = []
+    own = {
+        key: trials[trials["number"] == place].reset_index() for place, key in enumerate(conditions)
+    }
     for (number, reading), condition in conditions.items():
-        counts = results.iterations(condition).astype(float)
-        saved = results.iterations(conditions[0, reading]) - counts
+        counts = own[number, reading]["iterations"].astype(float)
+        saved = own[0, reading]["iterations"] - counts
         low, high = mean_intervals(np.stack([counts, saved]))
         near = pairs_near(condition.selected)
         rows.append(
@@ -158,7 +202,7 @@ def numbers_table(
                 "number": number,
                 "pairs": near["pairs"],
                 "leaving": near["leaving"],
-                "capped": int((~results.converged(condition)).sum()),
+                "capped": int((own[number, reading]["converged"] == 0).sum()),
                 "mean": counts.mean(),
                 "low": low[0],
                 "high": high[0],

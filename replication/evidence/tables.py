@@ -15,13 +15,11 @@ from replication.envs.maze import Maze
 from replication.evidence.experiments import Key, under
 from replication.evidence.statistics import Comparison, compare, holm, mean_prediction, summarise
 from replication.files import write_file
-from replication.irl import METHODS
+from replication.irl import METHODS, Trial
 from replication.irl.expectations import visited
 from replication.paper.published import Published
-from replication.trials.compute import TRACED_TRIAL
 from replication.trials.condition import Condition
 from replication.trials.measures import factors
-from replication.trials.results import Results
 
 
 def rows_of(trials: pd.DataFrame, condition: Condition) -> pd.DataFrame:
@@ -177,14 +175,13 @@ def pairs_near(demos: Demos) -> dict[str, int]:
     return counts
 
 
-def marked_table(results: Results, condition: Condition) -> pd.DataFrame:
-    """Return how often Algorithm 2's special case applies in the traced trial, by iteration.
+def marked_table(trial: Trial, condition: Condition) -> pd.DataFrame:
+    """Return how often Algorithm 2's special case applies in a trial, by iteration.
 
     `wrong` counts the pairs that the agent visits and the expert never does; `marked` those of them
     that an incorrect demonstration visits; `again` those that were marked and wrong before: under
     F_i as printed only these are moved with the largest trace.
     """
-    trial = results.trial(condition, TRACED_TRIAL)
     shape = condition.agent.shape
     incorrect = visited(condition.selected.incorrect, shape=shape)
     expert = visited(condition.selected.correct, shape=shape)
@@ -211,7 +208,12 @@ def marked_table(results: Results, condition: Condition) -> pd.DataFrame:
 
 def write_csv(table: pd.DataFrame, path: Path) -> Path:
     """Write a table as CSV: ten significant digits, the same on every platform."""
-    return write_file(path, table.to_csv(index=False, float_format="%.10g", lineterminator="\n"))
+    return write_file(path, csv_text(table))
+
+
+def csv_text(table: pd.DataFrame) -> str:
+    """Return the text of a table's file."""
+    return str(table.to_csv(index=False, float_format="%.10g", lineterminator="\n"))
 
 
 def read_table(path: Path) -> pd.DataFrame:

@@ -7,7 +7,8 @@ An example::
             "figures": ["fig05"],
             "tables": ["table1"],
             "players": ["player"],
-            "data": ["trials.csv"],
+            "data": ["film.gif"],
+            "trials": true,
             "needs": [],
             "inputs": ["replication/paper/choices.toml"],
             "profiles": {"quick": {"trials": 6}, "paper": {"trials": 100}},
@@ -28,6 +29,9 @@ EXECUTED = "notebook.ipynb"
 MANIFEST = "provenance.json"
 """What the outputs came from, in the same folder."""
 
+TRIALS = "trials.csv"
+"""The table of trials that a notebook computes; all else that it publishes follows from it."""
+
 SUFFIXES = {
     "figures": (".csv", ".png", ".svg"),
     "tables": (".csv", ".md"),
@@ -40,7 +44,7 @@ def _plain(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if not re.fullmatch(r"\w[\w.-]*", name):
             raise ValueError(f"{name!r} is not a plain name without a folder")
-        if name in (EXECUTED, MANIFEST):
+        if name in (EXECUTED, MANIFEST, TRIALS):
             raise ValueError(f"{name!r} is written by every run")
         if names.count(name) > 1:
             raise ValueError(f"{name!r} stands there twice")
@@ -60,6 +64,8 @@ class Declaration(BaseModel):
         NAME.csv, a table NAME.md and NAME.csv, a player NAME.html and NAME.csv.
     data
         Other files that it writes.
+    trials
+        Whether it computes trials, and so writes their table, `trials.csv`.
     needs
         Notebooks whose published folders it reads, from the folder in its parameter `results`.
     inputs
@@ -75,6 +81,7 @@ class Declaration(BaseModel):
     tables: Names = ()
     players: Names = ()
     data: Names = ()
+    trials: bool = False
     needs: Names = ()
     inputs: tuple[str, ...] = ()
     profiles: dict[str, dict[str, Any]] = {}
@@ -84,4 +91,4 @@ class Declaration(BaseModel):
         """The names of all files."""
         stems = ((stem, kind) for kind in SUFFIXES for stem in getattr(self, kind))
         names = [stem + suffix for stem, kind in stems for suffix in SUFFIXES[kind]]
-        return tuple(dict.fromkeys(names))
+        return tuple(dict.fromkeys([*names, TRIALS] if self.trials else names))

@@ -23,7 +23,7 @@ from replication.errors import UserError
 from replication.files import write_file
 from replication.pipeline.notebook import Notebook, RunError, first_line, refuse
 from replication.pipeline.rendering import as_text, clean, link_players, read_executed
-from replication.progress import EVENTS, SCHEDULER, Display
+from replication.progress import EVENTS, Display
 
 KERNEL = "replication"
 
@@ -40,7 +40,7 @@ def execute(
     failed: Path,
     timeout: int,
     display: Display,
-    scheduler: str = "",
+    settings: Mapping[str, str] | None = None,
 ) -> str:
     """Execute a notebook, which writes into `stage`; return the executed one as it is published.
 
@@ -54,10 +54,12 @@ def execute(
         Folders of this machine, and those that the executed notebook names instead.
     failed
         File for the notebook if it fails.
-    timeout, scheduler
-        Those of :func:`run.run_notebooks`.
+    timeout
+        Seconds that one cell may take.
     display
         Shows the progress of trials.
+    settings
+        More environment variables, see :mod:`replication.progress`.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def execute(
         }
         write_file(scratch / "source.ipynb", as_text(notebook.load()))
         write_file(scratch / "options.json", json.dumps(options))
-        _drive(scratch, _environment(scratch, scheduler), display)
+        _drive(scratch, {**_environment(scratch), **(settings or {})}, display)
         try:
             node = read_executed(draft, folders)
         except (OSError, ValueError):  # it was not begun, or cut off
@@ -96,7 +98,7 @@ def execute(
         return as_text(link_players(clean(notebook, node)))
 
 
-def _environment(scratch: Path, scheduler: str) -> dict[str, str]:
+def _environment(scratch: Path) -> dict[str, str]:
     """Return the environment of a run, in which the only kernel is this interpreter."""
     spec = {
         # its own warnings (that local sockets are not encrypted) do not concern the user
@@ -119,7 +121,6 @@ def _environment(scratch: Path, scheduler: str) -> dict[str, str]:
         "PYTHONSTARTUP": "",
         "PYTHONHASHSEED": "0",  # sets keep their order from run to run
         EVENTS: str(scratch / "events"),
-        **({SCHEDULER: scheduler} if scheduler else {}),
     }
 
 

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from replication import files
-from replication.pipeline.notebook import NotebookError, refuse
+from replication.pipeline.notebook import refuse
 from replication.pipeline.publish import recover
 
 LOCK = ".lock"
 
 PAPER = "figures"
 """The folder of the results of the profile "paper"."""
+
+EDITED = "build/edited"
+"""The folder of what would be the paper's results, had nothing been edited."""
 
 
 def outputs_folder(name: str) -> Path:
@@ -34,13 +37,9 @@ def store_file(store: str, out: Path) -> Path:
     return writable(path.parent, out.resolve()) / path.name
 
 
-def check_profile(out: Path, departures: Sequence[str]) -> None:
-    """Refuse results that are not the paper's in the folder of the paper's results."""
-    if departures and out.resolve().is_relative_to((files.PROJECT / PAPER).resolve()):
-        raise NotebookError(
-            f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
-            f"for a run with {', '.join(departures)}"
-        )
+def is_published(out: Path) -> bool:
+    """Return whether a folder is that of the paper's results, or lies in it."""
+    return out.resolve().is_relative_to((files.PROJECT / PAPER).resolve())
 
 
 def writable(folder: Path, otherwise: Path) -> Path:

@@ -33,12 +33,17 @@ ROMAN = dict(enumerate(("I", "II", "III", "IV", "V"), start=1))
 
 def write_index(out: Path) -> None:
     """Write the page if it is not as it should be."""
-    path = out / INDEX
-    before = path.read_text(encoding="utf-8") if path.exists() else ""
-    sections = [_section(out, *item, before) for item in published_folders(out).items()]
-    text = "\n".join([HEAD, *sections])
+    before, text = index_texts(out)
     if text != before:
-        write_file(path, text)
+        write_file(out / INDEX, text)
+
+
+def index_texts(out: Path) -> tuple[str, str]:
+    """Return the page as it is, or an empty text, and as it should be."""
+    path = out / INDEX
+    before = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    sections = [_section(out, *item, before) for item in published_folders(out).items()]
+    return before, "\n".join([HEAD, *sections])
 
 
 def shown_outputs(folder: Path) -> Iterator[tuple[dict[str, Any], str]]:

@@ -12,7 +12,6 @@ import importlib.metadata
 import json
 import platform
 import subprocess
-import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,10 +140,8 @@ def damaged(
 
 
 def versions() -> dict[str, str]:
-    """Return what a run ran on, in neutral words."""
-    packages = {name: importlib.metadata.version(name) for name in REPORTED}
-    python = f"{sys.version_info.major}.{sys.version_info.minor}"
-    return {"python": python, "platform": f"{platform.system()} {platform.machine()}", **packages}
+    """Return the versions of the packages that are named in the manifest."""
+    return {name: importlib.metadata.version(name) for name in REPORTED}
 
 
 def read_runs(out: Path) -> dict[str, Any]:

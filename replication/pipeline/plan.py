@@ -10,7 +10,7 @@ from typing import Any
 import joblib
 
 from replication.errors import unknown
-from replication.pipeline.inputs import NEUTRAL, Inputs, inputs_of
+from replication.pipeline.inputs import NEUTRAL, Inputs, changes, inputs_of
 from replication.pipeline.manifest import State, read_manifest, state_of
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook, refuse
 
@@ -41,6 +41,14 @@ class Run:
     def state(self) -> State:
         """Whether what is published is up to date."""
         return state_of(self.folder, self.inputs)
+
+    @property
+    def edits(self) -> list[str]:
+        """What is not as it was for what is published, but for the outputs of other notebooks."""
+        manifest = read_manifest(self.folder)
+        theirs = tuple(f"{need}/" for need in self.notebook.declared.needs)
+        found = changes(manifest["inputs"], self.inputs) if manifest else []
+        return [change for change in found if not change.startswith(theirs)]
 
     def again(self) -> Run:
         """Return the same run with what its outputs depend on now."""
@@ -121,8 +129,8 @@ def _ordered(notebooks: Sequence[Notebook], out: Path) -> list[Notebook]:
                 known = sorted(path.stem for path in notebook.path.parent.glob("*.ipynb"))
                 refuse(notebook.path, f"needs {unknown(need, known, 'notebook')}")
             elif not read_manifest(out / need):
-                first = f"first: replicate run {need}, with the same options"
-                refuse(notebook.path, f"needs the outputs of {need} in {out}; {first}")
+                first = f"first, with the same options: replicate run {need} --out {out}"
+                refuse(notebook.path, f"needs the outputs of {need}; {first}")
         ordered[notebook.name] = notebook
 
     for notebook in notebooks:

@@ -19,14 +19,22 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from replication import files
 from replication.files import write_file
 from replication.pipeline.declaration import EXECUTED
-from replication.pipeline.folders import check_profile, exclusive, failed_notebook, store_file
+from replication.pipeline.folders import (
+    EDITED,
+    exclusive,
+    failed_notebook,
+    is_published,
+    outputs_folder,
+    store_file,
+)
 from replication.pipeline.index import write_index
 from replication.pipeline.inputs import changes
 from replication.pipeline.manifest import FRESH, read_runs, record_run, write_manifest
 from replication.pipeline.notebook import NotebookError, RunError, first_line
-from replication.pipeline.plan import Run, departures, prepare
+from replication.pipeline.plan import Run, departures, prepare, run_name
 from replication.pipeline.publish import check_outputs, check_target, differing, draft_folder, swap
 from replication.progress import SCHEDULER, Display
 
@@ -44,6 +52,24 @@ class Published:
     changed: tuple[Path, ...]
 
 
+def destination(
+    notebooks: Sequence[Path], *, profile: str, publish: bool, **asked: Any
+) -> tuple[Path, str]:
+    """Return where the outputs of a run go by default, and why not to `figures`, if so.
+
+    What is published in `figures` is replaced only if nothing that it depends on was edited, or if
+    `publish` says so.
+    """
+    out = outputs_folder(run_name(profile, seed=asked["seed"], parameters=asked["parameters"]))
+    if publish or not is_published(out):
+        return out, ""
+    try:
+        _check_unedited(prepare(notebooks, profile=profile, out=out, **asked))
+    except NotebookError as error:
+        return files.PROJECT / EDITED, str(error)
+    return out, ""
+
+
 def run_notebooks(
     notebooks: Sequence[Path],
     *,
@@ -52,6 +78,7 @@ def run_notebooks(
     timeout: int = TIMEOUT,
     force: bool = False,
     here: bool = False,
+    publish: bool = False,
     scheduler: str = "",
     checks: Mapping[str, Callable[[], object]] | None = None,
     echo: Echo = print,
@@ -68,13 +95,16 @@ def run_notebooks(
     ----------
     notebooks, profile, out, **asked
         See :func:`plan.prepare`. The project's `figures` take nothing but what the profile "paper"
-        gives, unchanged.
+        gives.
     timeout
         Seconds that one cell may take.
     force
         Whether to run what is up to date, too, and to compute every trial again.
     here
         Whether to run what is up to date, too, if it was made elsewhere, as in a fresh clone.
+    publish
+        Whether results in `figures` may be replaced by those of an edited notebook, of other data,
+        code or packages.
     scheduler
         Address of a Dask scheduler that trials are sent to.
     checks
@@ -94,13 +124,25 @@ def run_notebooks(
         declared ones or cannot be written.
     """
     other = [] if profile == "paper" else [f"--profile {profile}"]
-    check_profile(out, [*other, *departures(asked.get("seed"), asked.get("parameters"))])
-    runs = prepare(notebooks, profile=profile, out=out, **asked)
+    other += departures(asked.get("seed"), asked.get("parameters"))
+    if other and is_published(out):
+        raise NotebookError(
+            f"{out} holds the results of the profile 'paper', unchanged; choose another folder "
+            f"for a run with {', '.join(other)}"
+        )
+
+    def prepared() -> list[Run]:
+        runs = prepare(notebooks, profile=profile, out=out, **asked)
+        if is_published(out) and not publish:
+            _check_unedited(runs)
+        return runs
+
+    runs = prepared()
     for run in runs:
         check_target(run.notebook, run.folder)
     with exclusive(out, echo) as waited:
         if waited:  # notebooks may have been edited meanwhile
-            runs = prepare(notebooks, profile=profile, out=out, **asked)
+            runs = prepared()
         elsewhere = {run.name for run in runs} - read_runs(out).keys() if here else set()
 
         def is_due(run: Run) -> bool:
@@ -119,7 +161,8 @@ def run_notebooks(
                     render_text(run)
                     continue
                 display.begin(run.name)
-                options = {"timeout": timeout, "scheduler": scheduler, "display": display}
+                settings = {SCHEDULER: scheduler} if scheduler else {}
+                options = {"timeout": timeout, "settings": settings, "display": display}
                 published.append(_run_one(run, force=force, echo=echo, **options))
                 display.end()
         write_index(out)
@@ -146,46 +189,40 @@ def _check(runs: Sequence[Run], checks: Mapping[str, Callable[[], object]], sche
         raise NotebookError(message) from None
 
 
-def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
-    """Execute a notebook and publish its folder; `options` are those of `execute.execute`."""
-    from replication.pipeline import execute  # loads nbformat, which takes a second
+def _check_unedited(runs: Sequence[Run]) -> None:
+    """Refuse to replace published results by others than a notebook gave then."""
+    for run in runs:
+        if edits := run.edits:
+            more = f" and {len(edits) - 1} more" if len(edits) > 1 else ""
+            raise NotebookError(
+                f"{run.folder} keeps what was published, as {edits[0]}{more} since then; "
+                "--publish replaces it"
+            )
 
-    notebook, values, began = run.notebook, dict(run.values), time.monotonic()
-    given = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
+
+def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
+    """Make a notebook's folder and publish it; `options` are those of `execute.execute`."""
+    notebook, began = run.notebook, time.monotonic()
+    given = ", ".join(f"{name} = {json.dumps(value)}" for name, value in run.values.items())
     echo(f"{run.name}: running, {given}" if given else f"{run.name}: running")
-    if "results" in notebook.literals:
-        values["results"] = str(run.out.resolve())
+    failed = failed_notebook(run.name, run.out)
     with (
         draft_folder(run.out) as stage,
         # A kernel that is being killed may still write there.
         tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch,
     ):
-        if "store" in notebook.literals:
-            store = store_file(values.get("store", notebook.literals["store"]), run.out)
-            values["store"] = str(Path(scratch) / "trials.sqlite" if force else store)
-        failed = failed_notebook(run.name, run.out)
-        folders = {stage.resolve(): run.folder, run.out.resolve(): run.out}
+        store = Path(scratch) / "trials.sqlite" if force else store_of(run)
         try:
-            executed = execute.execute(
-                notebook, values, stage.resolve(), folders=folders, failed=failed, **options
-            )
-            check_outputs(notebook, stage)
-            if changed := changes(run.inputs, run.again().inputs):
-                reasons = ", ".join(f"{reason} during the run" for reason in changed)
-                message = f"{reasons}: nothing is published; run it again"
-                raise RunError(f"{notebook.path}: {message}")
+            produce(run, stage, store=store, failed=failed, **options)
         except RunError:
             if failed.exists():
                 echo(f"{run.name}: failed; as far as it ran: {failed}")
             raise
         try:
-            write_file(stage / EXECUTED, executed)
-            write_manifest(stage, run.inputs, notebook.published)
             differ = differing(stage, run.folder, notebook.published)
             swap(stage, run.folder)
         except OSError as error:
-            reason = error.strerror or str(error)  # the path of a draft would not help the user
-            raise RunError(f"{notebook.path}: cannot publish to {run.out}: {reason}") from error
+            raise _unpublished(run, error) from error
     seconds = time.monotonic() - began
     record_run(run.out, run.name, seconds, options["display"].computed)
     failed.unlink(missing_ok=True)
@@ -194,8 +231,65 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
     if differ:
         compared = f"; other bytes than before: {', '.join(differ)}"
     echo(f"{run.name}: {number} output{'s' * (number != 1)} in {seconds:.1f} s{compared}")
-    files = [run.folder / name for name in notebook.published]
-    return Published(tuple(files), tuple(run.folder / name for name in differ or ()))
+    whole = (run.folder / name for name in notebook.published)
+    return Published(tuple(whole), tuple(run.folder / name for name in differ or ()))
+
+
+def store_of(run: Run) -> Path:
+    """Return the file in which a run keeps its trials."""
+    literals = run.notebook.literals
+    return store_file(run.values.get("store", literals.get("store", "trials.sqlite")), run.out)
+
+
+def produce(run: Run, stage: Path, *, store: Path, failed: Path, **options: Any) -> None:
+    """Execute a notebook and write all that it publishes, the manifest included, into a folder.
+
+    Parameters
+    ----------
+    run
+        What to execute.
+    stage
+        The folder, which is empty.
+    store
+        The file of finished trials.
+    failed, **options
+        Those of :func:`execute.execute`.
+
+    Raises
+    ------
+    UserError, RunError
+        As `execute.execute`; also if the outputs are not those declared, cannot be written, or if
+        something that they depend on was edited meanwhile.
+    """
+    from replication.pipeline import execute  # loads nbformat, which takes a second
+
+    notebook = run.notebook
+    folders = {"results": run.out.resolve(), "store": store}
+    values = {name: str(path) for name, path in folders.items() if name in notebook.literals}
+    shown = {stage.resolve(): run.folder, run.out.resolve(): run.out}
+    executed = execute.execute(
+        notebook,
+        {**run.values, **values},
+        stage.resolve(),
+        folders=shown,
+        failed=failed,
+        **options,
+    )
+    check_outputs(notebook, stage)
+    if changed := changes(run.inputs, run.again().inputs):
+        reasons = ", ".join(f"{reason} during the run" for reason in changed)
+        raise RunError(f"{notebook.path}: {reasons}: nothing is published; run it again")
+    try:
+        write_file(stage / EXECUTED, executed)
+        write_manifest(stage, run.inputs, notebook.published)
+    except OSError as error:
+        raise _unpublished(run, error) from error
+
+
+def _unpublished(run: Run, error: OSError) -> RunError:
+    """Return what to raise if a folder cannot be written; the path of a draft would not help."""
+    reason = error.strerror or str(error)
+    return RunError(f"{run.notebook.path}: cannot publish to {run.out}: {reason}")
 
 
 def render_text(run: Run) -> None:

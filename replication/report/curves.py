@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from replication.evidence.experiments import Key, under
+from replication.evidence.experiments import under
 from replication.irl import METHODS, READINGS
 from replication.irl.methods import Method
 from replication.paper.published import Published
@@ -26,8 +26,7 @@ from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, full_label
 from replication.report.style import canvas, legend_below, settled
 from replication.trials.compute import TRACED_TRIAL
-from replication.trials.condition import Condition
-from replication.trials.results import Results
+from replication.trials.measures import error_histories
 
 Panels = dict[str, list[tuple[Method, pd.DataFrame]]]
 
@@ -48,22 +47,16 @@ def _panels(numbers: pd.DataFrame) -> Panels:
 # --- errors ----------------------------------------------------------------------------------
 
 
-def errors(
-    results: Results,
-    conditions: Mapping[Key, Condition],
-    published: Mapping[str, int],
-    *,
-    median: bool = False,
-) -> Picture:
-    """Show the error d against the iteration.
+def errors(trials: pd.DataFrame, published: Mapping[str, int], *, median: bool = False) -> Picture:
+    """Show the error d against the iteration, given the trials of some methods with their `errors`.
 
     `published` has the iteration at which the paper's own curve is zero, by method. The trial that
     is drawn is trial 0 (FIG5-TRIAL), or the median one (FIG12-TRIAL).
     """
     parts, words = [], []
-    for (method, reading), condition in conditions.items():
-        every = results.errors(condition)
-        trial = median_trial(results.iterations(condition)) if median else TRACED_TRIAL
+    for (method, reading), rows in trials.groupby(["method", "reading"], sort=False):
+        every = error_histories(rows)
+        trial = median_trial(rows["iterations"].to_numpy()) if median else TRACED_TRIAL
         low, middle, high = np.quantile(every, [0.25, 0.5, 0.75], axis=0)
         columns = {
             "reading": reading,
@@ -151,20 +144,18 @@ def _handles(panels: Panels) -> list[Line2D]:
 # --- iterations ------------------------------------------------------------------------------
 
 
-def iterations(
-    results: Results, conditions: Mapping[Key, Condition], published: Mapping[str, Published]
-) -> Picture:
-    """Show the iterations of every trial, with their distribution.
+def iterations(trials: pd.DataFrame, published: Mapping[str, Published]) -> Picture:
+    """Show the iterations of every trial of some methods, with their distribution.
 
     That Fig. 9 shows this, and not errors, is the choice FIG9-AXES.
     """
     parts, words = [], []
-    for (method, reading), condition in conditions.items():
-        counts = pd.Series(results.iterations(condition))
+    for (method, reading), rows in trials.groupby(["method", "reading"], sort=False):
+        counts = rows["iterations"]
         columns = {
             "reading": reading,
             "method": method,
-            "trial": np.arange(len(counts)),
+            "trial": rows["trial"],
             "iterations": counts,
             "trials_alike": counts.groupby(counts).transform("size"),
             "mean": counts.mean(),

@@ -7,17 +7,26 @@ page from it goes by that name.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from replication.errors import UserError
 from replication.evidence.tables import read_table, write_csv
 from replication.files import write_file
+from replication.progress import GIVEN
 from replication.report.moving import Player
 from replication.report.picture import Picture
 from replication.report.readable import markdown
 from replication.report.style import save_figure
+from replication.trials.measures import Report
+from replication.trials.table import Group, computed_table, planned_table
+
+TRIALS = "trials.csv"
+"""The file with the table of trials."""
 
 
 class Shown:
@@ -68,3 +77,33 @@ class Outputs:
     def data(self, table: pd.DataFrame, name: str) -> None:
         """Write a table that is not shown as `name`.csv."""
         write_csv(table, self.folder / f"{name}.csv")
+
+    def computed(
+        self, groups: Sequence[Group], report: Report | None = None, *, seed: int, **options: Any
+    ) -> pd.DataFrame:
+        """Return the table of trials, on which everything else rests, as trials.csv has it.
+
+        It is computed, see :func:`replication.trials.table.computed_table`, unless the environment
+        variable GIVEN names a folder that has it: so everything else can be made again from it.
+
+        Raises
+        ------
+        UserError
+            If the given table has other trials than the plan.
+        """
+        given = os.environ.get(GIVEN)
+        if given:
+            table = read_table(Path(given) / TRIALS)
+            _check_planned(table, planned_table(groups, seed), Path(given) / TRIALS)
+        else:
+            table = computed_table(groups, report, seed=seed, **options)
+        return read_table(write_csv(table, self.folder / TRIALS))
+
+
+def _check_planned(table: pd.DataFrame, planned: pd.DataFrame, file: Path) -> None:
+    """Refuse a table whose rows are not the planned ones, in their order."""
+    if len(table) != len(planned):
+        raise UserError(f"{file} has {len(table)} trials instead of {len(planned)}")
+    for name in planned:
+        if name not in table or table[name].tolist() != planned[name].tolist():
+            raise UserError(f"{file} has other trials than were planned: see its column {name}")

@@ -10,7 +10,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 from replication.demos.files import load_demos
-from replication.evidence import experiments
+from replication.evidence import experiments, tables
 from replication.evidence.experiments import EXPERIMENTS, Key
 from replication.files import resolve
 from replication.irl import Trial
@@ -18,11 +18,10 @@ from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
 from replication.report.outputs import Outputs
 from replication.report.readable import markdown
 from replication.trials.compute import TRACED_TRIAL
-from replication.trials.condition import Condition
-from replication.trials.measures import Report, measure_trials
-from replication.trials.results import Results
+from replication.trials.measures import Report
 from replication.trials.run import run_trials
 from replication.trials.store import Store
+from replication.trials.table import Group
 
 
 class Study(Outputs):
@@ -40,6 +39,8 @@ class Study(Outputs):
         Root seed, and number of worker processes.
     store, out
         The file of finished trials, and the folder for the results.
+    sets
+        Whether the sets of incorrect demonstrations are run as well.
     report
         Fields of :class:`replication.trials.measures.Report`, such as the number of trials.
     """
@@ -54,6 +55,7 @@ class Study(Outputs):
         jobs: int,
         store: str,
         out: str,
+        sets: bool = True,
         **report: Any,
     ) -> None:
         super().__init__(resolve(out))
@@ -61,51 +63,46 @@ class Study(Outputs):
         self.demos = load_demos(resolve(demos))
         self.choices = {**design.choices, **choices}
         self.report = Report(**report)
-        self.seed, self.jobs, self.store = seed, jobs, Store(resolve(store))
+        self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
         self.conditions = experiments.method_conditions(self.demos, self.choices, design.methods)
+        self.sets = experiments.set_conditions(self.demos, self.choices) if sets else {}
         own = self.demos.task == experiment
         self.published: Mapping[str, Published] = PUBLISHED[experiment] if own else {}
         curves = PUBLISHED_CURVES.get(experiment, {})
         self.published_curves: Mapping[str, int] = curves if own else {}
 
-    def of(self, *methods: str) -> dict[Key, Condition]:
-        """Return the conditions of some methods."""
-        return {key: each for key, each in self.conditions.items() if key[0] in methods}
-
     @cached_property
-    def sets(self) -> dict[Key, Condition]:
-        """The conditions of the sets of incorrect demonstrations, by set and reading of Eq. 9."""
-        return experiments.set_conditions(self.demos, self.choices)
-
-    @cached_property
-    def results(self) -> Results:
-        """The trials of all methods."""
-        return self._run(self.conditions, self.report.trials)
+    def trials(self) -> pd.DataFrame:
+        """The table of all trials, those of the sets included; it is written."""
+        groups = [
+            Group(list(self.conditions.values()), self.report.trials),
+            Group(list(self.sets.values()), self.report.set_trials),
+        ]
+        return self.computed(groups, self.report, errors=True, **self.settings)
 
     @cached_property
     def main(self) -> pd.DataFrame:
-        """The table of the methods' trials."""
-        return measure_trials(self.results, self.conditions.values(), self.report)
+        """The rows of the methods' own trials."""
+        own = [tables.rows_of(self.trials, each) for each in self.conditions.values()]
+        return pd.concat([rows.head(self.report.trials) for rows in own], ignore_index=True)
 
-    @cached_property
-    def trials(self) -> pd.DataFrame:
-        """The table of all trials, those of the sets included."""
-        results = self._run(self.sets, self.report.set_trials)
-        others = measure_trials(results, self.sets.values(), self.report)
-        return pd.concat([self.main, others]).drop_duplicates(ignore_index=True)
+    def of(self, *methods: str) -> pd.DataFrame:
+        """Return the rows of some methods' own trials."""
+        return self.main[self.main["method"].isin(methods)].reset_index(drop=True)
 
     def traced(self, reading: str) -> dict[Key, Trial]:
         """Return the trial of each method that kept every iteration, under a reading of Eq. 9."""
-        return {
-            key: self.results.trial(condition, TRACED_TRIAL, snapshots=True)
+        shown = {
+            key: condition
             for key, condition in self.conditions.items()
             if experiments.applies(key[1], reading)
+        }
+        results = run_trials(list(shown.values()), trials=TRACED_TRIAL + 1, **self.settings)
+        return {
+            key: results.trial(condition, TRACED_TRIAL, snapshots=True)
+            for key, condition in shown.items()
         }
 
     def show(self, table: pd.DataFrame) -> Markdown:
         """Show a table that is not written."""
         return Markdown(markdown(table))
-
-    def _run(self, conditions: Mapping[Key, Condition], trials: int) -> Results:
-        every = list(conditions.values())
-        return run_trials(every, trials=trials, store=self.store, jobs=self.jobs, seed=self.seed)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,27 +36,62 @@ DIGITS = 8
 """Decimals of a measure, so that a file with ten significant digits holds it exactly."""
 
 
-def measure_trials(
-    results: Results, conditions: Iterable[Condition], report: Report | None = None
-) -> pd.DataFrame:
-    """Return the table of some conditions' trials, one row a trial: what ``trials.csv`` holds.
+def planned_trials(conditions: Iterable[Condition], trials: int, seed: int) -> pd.DataFrame:
+    """Return the columns that name each trial: those of :func:`factors`, `trial` and `seed`."""
+    rows = [
+        factors(condition) | {"trial": k, "seed": seed}
+        for condition in conditions
+        for k in range(trials)
+    ]
+    return pd.DataFrame(rows)
 
-    The columns are those of :func:`factors`, `trial`, `seed`, those of :func:`measure`, `steps` (of
-    the environment) and `digest`. A condition that is given twice has its rows once.
-    """
-    report = report or Report()
+
+def measure_trials(
+    results: Results,
+    conditions: Iterable[Condition],
+    report: Report | None = None,
+    *,
+    errors: bool = False,
+) -> pd.DataFrame:
+    """Return the table of some conditions' trials, with a :func:`trial_row` for each."""
     rows = []
     for condition in conditions:
-        marked = marked_pairs(shown_demos(condition))
-        for k in range(results.trials):
-            trial = results.trial(condition, k)
-            rows.append(
-                factors(condition)
-                | {"trial": k, "seed": results.seed}
-                | measure(trial, condition.demos, marked, report)
-                | {"steps": trial.steps, "digest": digest(trial)}
-            )
-    return pd.DataFrame(rows).drop_duplicates(ignore_index=True)
+        row = trial_row(condition, report or Report(), errors=errors)
+        rows += [row(results.trial(condition, k), k, results.seed) for k in range(results.trials)]
+    return pd.DataFrame(rows)
+
+
+def trial_row(
+    condition: Condition, report: Report, *, errors: bool
+) -> Callable[[Trial, int, int], dict[str, Any]]:
+    """Return a function of a trial, its number and its root seed: its row in ``trials.csv``.
+
+    The columns are those of :func:`planned_trials` and :func:`measure`, `steps` (of the
+    environment), `digest` and, if asked for, `errors`: d before each iteration and after the last
+    one, separated by blanks.
+    """
+    marked = marked_pairs(shown_demos(condition))
+
+    def row(trial: Trial, k: int, seed: int) -> dict[str, Any]:
+        return (
+            factors(condition)
+            | {"trial": k, "seed": seed}
+            | measure(trial, condition.demos, marked, report)
+            | {"steps": trial.steps, "digest": digest(trial)}
+            | ({"errors": " ".join(f"{d:.10g}" for d in trial.errors)} if errors else {})
+        )
+
+    return row
+
+
+def error_histories(trials: pd.DataFrame) -> NDArray[np.float64]:
+    """Return d of every row of a table of trials, `[trial, iteration]`.
+
+    After its end a trial keeps its last d.
+    """
+    curves = [np.array(text.split(), dtype=float) for text in trials["errors"]]
+    longest = max(map(len, curves))
+    return np.array([np.pad(d, (0, longest - len(d)), mode="edge") for d in curves])
 
 
 def factors(condition: Condition) -> dict[str, str]:

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from replication.irl import Trial
@@ -35,49 +34,21 @@ class Results:
     ) -> None:
         self._store = store
         self._traced = traced
-        self._known: dict[str, tuple[NDArray[np.float64], bool]] = {}
         self.seed = seed
         self.trials = trials
         self.conditions = list(conditions)
 
     def trial(self, condition: Condition, k: int, *, snapshots: bool = False) -> Trial:
         """Return trial `k` of a condition; one that was damaged in the store is computed again."""
-        key = self._key(condition, k)
+        key = trial_key(condition, self.seed, k, traced=self._traced)
         try:
-            trial = self._store.get(key, snapshots=snapshots)
+            return self._store.get(key, snapshots=snapshots)
         except DamagedTrialError:
             self._store.drop(key)
             self._store.put(
                 compute(condition.agent, [(condition, k)], self.seed, traced=self._traced)
             )
-            trial = self._store.get(key, snapshots=snapshots)
-        self._known[key] = trial.errors, trial.converged
-        return trial
-
-    def _key(self, condition: Condition, k: int) -> str:
-        return trial_key(condition, self.seed, k, traced=self._traced)
-
-    def errors(self, condition: Condition) -> NDArray[np.float64]:
-        """Return d of every trial, `[trial, iteration]`; after its end a trial keeps its last d."""
-        curves = [curve for curve, _ in self._outcomes(condition)]
-        longest = max(map(len, curves))
-        return np.array([np.pad(d, (0, longest - len(d)), mode="edge") for d in curves])
-
-    def iterations(self, condition: Condition) -> NDArray[np.int64]:
-        """Return the number of iterations of every trial, `[trial]`."""
-        return np.array([len(curve) - 1 for curve, _ in self._outcomes(condition)])
-
-    def converged(self, condition: Condition) -> NDArray[np.bool_]:
-        """Return whether each trial converged, `[trial]`."""
-        return np.array([converged for _, converged in self._outcomes(condition)])
-
-    def _outcomes(self, condition: Condition) -> list[tuple[NDArray[np.float64], bool]]:
-        """Return the errors of every trial, and whether it converged; each is read once."""
-        keys = [self._key(condition, k) for k in range(self.trials)]
-        for k, key in enumerate(keys):
-            if key not in self._known:
-                self.trial(condition, k)
-        return [self._known[key] for key in keys]
+            return self._store.get(key, snapshots=snapshots)
 
 
 def digest(trial: Trial) -> str:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from replication import Demos
 from replication.evidence.experiments import method_conditions
 from replication.evidence.specifications import Specification
 from replication.trials.condition import Condition
+from replication.trials.measures import measure_trials
 from replication.trials.results import Results
 from replication.trials.run import run_trials
 from replication.trials.store import Store
@@ -13,6 +15,18 @@ from replication.trials.store import Store
 FEW = {"episodes": 100, "horizon": 40}
 
 Run = tuple[Results, dict[Specification, dict[tuple[str, str], Condition]]]
+
+
+def table_of(run: Run) -> pd.DataFrame:
+    """Return the table of the trials of a run, numbered by specification."""
+    results, conditions = run
+    return pd.concat(
+        [
+            measure_trials(results, own.values()).assign(number=number)
+            for number, own in enumerate(conditions.values())
+        ],
+        ignore_index=True,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -22,6 +22,7 @@ from replication.evidence.calibration import (
     grid,
     grid_conditions,
     kl_divergence,
+    plan,
 )
 from replication.evidence.claims import load_claims
 from replication.evidence.statistics import mean_prediction
@@ -29,8 +30,8 @@ from replication.evidence.tables import read_table
 from replication.files import PROJECT
 from replication.paper.published import Published
 from replication.paper.register import load_choices
-from replication.trials.run import run_trials
 from replication.trials.store import Store
+from replication.trials.table import computed_table
 
 FIGURES = PROJECT / "figures"
 
@@ -130,22 +131,24 @@ def test_conditions_differ_in_the_grid_alone(small_demos: Demos) -> None:
 
 def test_table_of_a_run(small_demos: Demos, tmp_path: object) -> None:
     """The table has the trials' own numbers, the nearest point first, and one default."""
-    every = grid_conditions(as_maze(small_demos.environment))
     points = [chosen(), (2, 0.9, 0.5, "random"), (2, 0.1, 1.0, "first")]
-    conditions = {point: every[point] for point in points}
+    numbers = [grid().index(point) for point in points]
+    every = plan(as_maze(small_demos.environment), 4)
+    groups = [every[number] for number in numbers]
     store = Store(tmp_path / "trials.sqlite")  # type: ignore[operator]
-    results = run_trials(list(conditions.values()), trials=4, store=store, seed=ROOT)
-    table = calibration_table(results, conditions)
+    trials = computed_table(groups, store=store, seed=ROOT)
+    table = calibration_table(trials)
+    assert len(table) == 3
     assert table["default"].sum() == 1
     assert table["kl_divergence"].is_monotonic_increasing
     for row in table.to_dict("records"):
-        condition = conditions[tuple(row[id] for id in CALIBRATED)]
-        counts = results.iterations(condition)
+        point = tuple(row[id] for id in CALIBRATED)
+        counts = trials.loc[trials["number"] == grid().index(point), "iterations"]
         assert (row["n"], row["capped"]) == (4, 0)
         assert row["mean"] == pytest.approx(counts.mean())
         assert row["sd"] == pytest.approx(counts.std(ddof=1))
         assert row["kl_divergence"] == kl_divergence(row["mean"], row["sd"], PAIR)
-        assert row["default"] == (condition is conditions[chosen()])
+        assert row["default"] == (point == chosen())
 
 
 # --- the check -------------------------------------------------------------------------------
@@ -162,7 +165,11 @@ def test_check_holds_new_trials_against_the_published_distribution() -> None:
             "iterations": [*draw, *(draw + 3), *(draw + 9)],
         }
     )
-    check = check_table(draw[:30].astype(int), trials)
+    number = grid().index(chosen())
+    others = pd.DataFrame({"number": [number + 1] * 30, "iterations": draw[30:60].astype(int)})
+    own = pd.DataFrame({"number": [number] * 30, "iterations": draw[:30].astype(int)})
+    check = check_table(pd.concat([others, own]), trials)
+    assert check.loc[0, "mean"] == own["iterations"].mean()
     assert check["trials"].tolist() == ["grid", "new", "new"]
     assert check["reading"].tolist() == ["printed", "printed", "updated"]
     assert check["n"].tolist() == [30, 100, 100]

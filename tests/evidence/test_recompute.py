@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -8,83 +9,96 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
 
-from replication import Demos, save_demos
-from replication.evidence import recompute
+from replication import Demos, load_demos, save_demos
+from replication.envs.maze import as_maze
+from replication.evidence import calibration, sweep
 from replication.evidence.experiments import EXPERIMENTS, Experiment, condition_of
-from replication.evidence.recompute import recompute_trials, sampled_trials
+from replication.evidence.recompute import declared_condition, recompute_trials, sampled
+from replication.evidence.tables import write_csv
 from replication.trials.compute import trial_key
-from replication.trials.condition import Condition
-from replication.trials.results import Results, digest
-from replication.trials.run import run_trials
 from replication.trials.store import Store
+from replication.trials.table import Group, computed_table, planned_table
 
+MEASURED = ("iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope")
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
-TRIALS = 5
-HEAD = b"task,method,reading,set,trial,seed,iterations,converged,steps,digest\n"
-
-
-def table_of(results: Results, conditions: dict[tuple[str, str], Condition]) -> pd.DataFrame:
-    """Return the columns of a table of trials that a recomputation reads."""
-    rows = []
-    for (method, reading), condition in conditions.items():
-        for k in range(results.trials):
-            trial = results.trial(condition, k)
-            name = ("small", method, reading, "none", k, 4)
-            made = (trial.iterations, int(trial.converged), trial.steps, digest(trial))
-            rows.append(name + made)
-    return pd.DataFrame(rows, columns=list(recompute.COLUMNS))
+HEAD = "task,method,reading,set,trial,seed\n"
 
 
 @pytest.fixture
-def out(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with the trials.csv of a small task, and its store beside it."""
+def table(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the trials.csv of a small task, with its store beside it."""
     save_demos(small_demos, tmp_path / "small.json")
     experiment = Experiment(str(tmp_path / "small.json"), FEW, ("adaboost", "unified"))
     monkeypatch.setitem(EXPERIMENTS, "small", experiment)
-    monkeypatch.setattr(recompute, "EVERY", 3)
-    conditions = experiment.conditions()
-    results = run_trials(
-        list(conditions.values()), trials=TRIALS, store=Store(tmp_path / "s.sqlite"), seed=4
-    )
-    (tmp_path / "out" / "small").mkdir(parents=True)
-    table_of(results, conditions).to_csv(tmp_path / "out" / "small" / "trials.csv", index=False)
-    return tmp_path / "out"
+    groups = [Group(list(experiment.conditions().values()), 4)]
+    store = Store(tmp_path / "s.sqlite")
+    trials = computed_table(groups, errors=True, store=store, seed=4)
+    return write_csv(trials, tmp_path / "trials.csv")
 
 
-def trials_of(out: Path) -> pd.DataFrame:
-    """Return the table of trials."""
-    return pd.read_csv(out / "small" / "trials.csv", keep_default_na=False)
+def trials_of(table: Path) -> pd.DataFrame:
+    """Return a table of trials as text."""
+    return pd.read_csv(table, dtype=str, keep_default_na=False)
 
 
-def wrong(out: Path, **options: Any) -> list[str]:
-    """Return what is wrong with the trials of a folder."""
-    return list(recompute_trials(out, out.parent / "s.sqlite", **options))
+def wrong(table: Path, *, seed: int = 1, every: int = 1, **options: Any) -> list[str]:
+    """Return what is wrong with a table; by default all of it is computed again."""
+    store = table.with_name("s.sqlite")
+    return list(recompute_trials({"t": table}, store, seed=seed, every=every, **options))
 
 
-def test_what_was_computed_here_agrees(out: Path) -> None:
-    """A sample is computed again, with or without a store, by any number of workers."""
+def test_what_was_computed_here_agrees(table: Path) -> None:
+    """All trials are computed again, with or without a store, by any number of workers."""
     told: list[int] = []
-    assert wrong(out, report=told.append) == []
-    assert told == [len(sampled_trials(out / "small" / "trials.csv"))] == [5]
-    assert wrong(out, jobs=2) == []
-    (out.parent / "s.sqlite").unlink()
-    assert wrong(out) == []
-    assert not (out.parent / "s.sqlite").exists()
+    assert wrong(table, report=told.append) == []
+    assert told == [12]
+    assert wrong(table, jobs=2) == []
+    table.with_name("s.sqlite").unlink()
+    assert wrong(table) == []
+    assert not table.with_name("s.sqlite").exists()
 
 
-@pytest.mark.parametrize("column", ["iterations", "converged", "steps", "seed", "trial", "digest"])
-def test_a_changed_row_is_found(out: Path, column: str) -> None:
-    """Whatever of a sampled row is not what its trial gives, the row is named."""
-    table = trials_of(out)
-    value = table.loc[3, column]
-    special = {"converged": 1 - int(value) if column == "converged" else 0}
-    special |= {"digest": table.loc[6, "digest"]}
-    table.loc[3, column] = special[column] if column in special else value + 1
-    table.to_csv(out / "small" / "trials.csv", index=False)
-    (message,) = wrong(out)
-    name = f"small/trials.csv: adaboost, -, none, trial {table.loc[3, 'trial']}: "
-    assert message.startswith(name)
+@given(rows=st.integers(1, 200), every=st.integers(1, 40), seed=st.integers(0, 2**32))
+def test_a_sample_is_random_and_has_the_size_that_is_said(rows: int, every: int, seed: int) -> None:
+    """One row in so many is drawn, at least one, none twice, and by the seed alone."""
+    (first,), (again,), (other,) = (sampled([rows], root, every) for root in (seed, seed, seed + 1))
+    assert first.tolist() == again.tolist() == sorted(set(first.tolist()))
+    assert len(first) == math.ceil(rows / every)
+    assert 0 <= first.min() <= first.max() < rows
+    assert len(other) == len(first)
+
+
+def test_each_row_is_as_likely_as_any_other() -> None:
+    """Over many seeds each row is drawn equally often: a forger cannot know which are safe."""
+    counts = np.zeros(40)
+    for seed in range(2000):
+        counts[sampled([40], seed, 20)[0]] += 1
+    assert counts.sum() == 4000
+    assert stats.chisquare(counts).pvalue > 0.001
+
+
+@pytest.mark.parametrize("column", [*MEASURED, "seed", "trial", "steps", "digest", "errors"])
+def test_a_changed_number_is_found(table: Path, column: str) -> None:
+    """Whatever of a sampled row is not what its trial gives, the row and the column are named."""
+    trials = trials_of(table)
+    value = trials.loc[5, column]
+    trials.loc[5, column] = f"{value[:-1]}{(int(value[-1], 16) + 1) % 2}"
+    trials.to_csv(table, index=False)
+    (message,) = wrong(table)
+    assert message.startswith("t, row 6: its trial gives another ")
+    assert column in message or column in ("seed", "trial")
+
+
+def test_rows_in_other_words_are_found(table: Path) -> None:
+    """A column that is not there, or one too many, is a difference of every row."""
+    trials_of(table).drop(columns="q_slope").assign(note="good").to_csv(table, index=False)
+    messages = wrong(table)
+    assert len(messages) == 12
+    assert all("gives another note, q_slope" in message for message in messages)
 
 
 @pytest.mark.parametrize(
@@ -93,68 +107,84 @@ def test_a_changed_row_is_found(out: Path, column: str) -> None:
         (b"", "No columns to parse"),
         (b"\xff\xfe\x00", "codec can't decode"),
         (b'task,"method\n', "EOF inside string"),
-        (HEAD.replace(b",digest", b""), "digest"),
-        (HEAD + b"small,unified,printed,none,one,4,1,1,1,x\n", "invalid literal"),
-        (HEAD + b"small,unified,printed,none,,4,1,1,1,x\n", "invalid literal"),
-        (HEAD + b"small,unified,printed,none,0,-4,1,1,1,x\n", "impossible number"),
-        (HEAD + b"small,unified,printed,none,1000000000,4,1,1,1,x\n", "impossible number"),
+        (b"task,method\n1,2\n", "it has no column reading"),
+        (HEAD.encode(), "it has no trials"),
     ],
 )
-def test_a_damaged_file_is_one_line(out: Path, content: bytes, message: str) -> None:
-    """A trials.csv that holds no trials is an error that is told, not a traceback."""
-    (out / "small" / "trials.csv").write_bytes(content)
-    (line,) = wrong(out)
-    assert line.startswith("small/trials.csv cannot be read: ")
+def test_a_damaged_file_is_one_line(table: Path, content: bytes, message: str) -> None:
+    """A file that holds no trials is an error that is told, not a traceback."""
+    table.write_bytes(content)
+    (line,) = wrong(table)
+    assert line.startswith("t cannot be read: ")
     assert message in line
     assert "\n" not in line
 
 
-@pytest.mark.parametrize("column", ["method", "reading", "set"])
-def test_a_row_that_means_nothing_is_found(out: Path, column: str) -> None:
-    """A row that no condition belongs to is named, and the others are computed."""
-    table = trials_of(out)
-    row = 6  # of a method with a trace
-    table.loc[row, column] = "unheard"
-    table.loc[row, "method"] = "unheard" if column == "method" else "unified-incorrect"
-    table.to_csv(out / "small" / "trials.csv", index=False)
-    (message,) = wrong(out)
-    assert message.startswith("small/trials.csv: un")
-    assert ": no such condition: " in message
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("small,unified,printed,none,one,4", "invalid literal"),
+        ("small,unified,printed,none,,4", "invalid literal"),
+        ("small,unified,printed,none,0,-4", "impossible number"),
+        ("small,unified,printed,none,1000000000,4", "impossible number"),
+        ("small,unheard,printed,none,0,4", "unheard"),
+        ("small,unified,unheard,none,0,4", "unheard"),
+        ("small,unified-incorrect,printed,unheard,0,4", "unheard"),
+        ("other,unified,printed,none,0,4", "unknown task"),
+    ],
+)
+def test_a_row_that_means_nothing_is_found(table: Path, row: str, message: str) -> None:
+    """A row that no trial belongs to is named."""
+    table.write_text(f"{HEAD}{row}\n")
+    (line,) = wrong(table)
+    assert line.startswith("t, row 1: no such trial: ")
+    assert message in line
 
 
-def test_a_changed_stored_trial_is_found(out: Path) -> None:
+def test_a_changed_stored_trial_is_found(table: Path) -> None:
     """One bit of a stored result, or a record that cannot be read, is found."""
-    store = Store(out.parent / "s.sqlite")
-    row = trials_of(out).iloc[0]
-    condition = condition_of(row["task"], row["method"], row["reading"], row["set"])
-    key = trial_key(condition, int(row["seed"]), int(row["trial"]))
+    store = Store(table.with_name("s.sqlite"))
+    row = trials_of(table).iloc[0]
+    key = trial_key(declared_condition(row.to_dict()), int(row["seed"]), int(row["trial"]))
     trial = store.get(key)
     weights = trial.weights.copy()
     weights[0, 0] = np.nextafter(weights[0, 0], 1)
     store.drop(key)
     store.put([(key, replace(trial, weights=weights))])
-    expected = (
-        "s.sqlite: small/trials.csv: adaboost, -, none, trial 0: the stored trial has other bits"
-    )
-    assert wrong(out) == [expected]
+    expected = ["s.sqlite: t, row 1: the stored trial has other bits"]
+    assert wrong(table) == expected
     connection = sqlite3.connect(store.path)
     with connection:
         connection.execute("UPDATE trials SET record = x'00' WHERE key = ?", (key,))
     connection.close()
-    assert wrong(out) == [expected]
+    assert wrong(table) == expected
 
 
-def test_rows_of_other_tasks_are_left_out(out: Path) -> None:
-    """Only what belongs to an experiment is sampled; without a table there is nothing."""
-    trials_of(out).assign(task="other").to_csv(out / "small" / "trials.csv", index=False)
-    assert wrong(out) == []
-    (out / "small" / "trials.csv").unlink()
-    assert wrong(out) == []
+# --- conditions ------------------------------------------------------------------------------
 
 
-def test_one_trial_in_twenty_is_sampled() -> None:
-    """The sample is 5 %."""
-    assert recompute.EVERY == 20
+def test_conditions_of_the_sweep_and_the_grid_come_back() -> None:
+    """A row with a part and a number belongs to the condition that was planned there."""
+    maze = as_maze(load_demos(EXPERIMENTS["open-maze"].demos).environment)
+    groups = sweep.plan(most_trials=1, most_specifications=3) + calibration.plan(maze, 1)[:3]
+    for group in groups:
+        table = planned_table([group], 7)
+        for row, condition in zip(
+            table.astype(str).to_dict("records"), group.conditions, strict=True
+        ):
+            again = declared_condition({str(name): value for name, value in row.items()})
+            assert trial_key(again, 7, 0) == trial_key(condition, 7, 0)
+
+
+@pytest.mark.parametrize(
+    ("part", "number"),
+    [("mazes", "-1"), ("mazes", "1000"), ("grid", "120"), ("numbers", "99"), ("unheard", "0")],
+)
+def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:
+    """A part or a number that nothing was declared for is refused."""
+    row = {"part": part, "number": number, "task": "open-maze", "method": "unified"}
+    with pytest.raises(LookupError):
+        declared_condition(row | {"reading": "printed", "set": "none"})
 
 
 @pytest.mark.parametrize("task", list(EXPERIMENTS))

@@ -30,7 +30,7 @@ from replication.evidence.statistics import mean_intervals, sd_ratio_intervals, 
 from replication.evidence.tables import read_table
 from replication.files import PROJECT
 from replication.trials.measures import measure_trials
-from tests.evidence.conftest import Run
+from tests.evidence.conftest import Run, table_of
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "ALPHA": (0.1, 0.3, 0.5, 0.9),
@@ -315,10 +315,11 @@ def test_published_effects_have_their_outcomes(published: pd.DataFrame) -> None:
 def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     """Effects equal the statistics of the trials; capped trials count as the cap and are told."""
     results, conditions = tiny
+    trials = table_of(tiny)
     wanted: list[Claim] = [
         load_claims().by_id(id) for id in ("FASTER", "SAVES-OPEN", "Q-GROWS", "ZERO-OPEN")
     ]
-    table = effects_table(results, conditions, wanted)
+    table = effects_table(trials, list(conditions), wanted)
     assert table.groupby("claim", sort=False).size().to_dict() == {
         "FASTER": 1,  # the second specification has no AdaBoost-IRL
         "SAVES-OPEN": 2,
@@ -329,9 +330,9 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
     for row in table.itertuples():
         claim = load_claims().by_id(row.claim)
         (own,) = (one for s, one in conditions.items() if s.name == row.specification)
-        trials = measure_trials(results, own.values())
-        x = trials[trials["method"] == claim.x]
-        y = trials[trials["method"] == claim.y]
+        measured = measure_trials(results, own.values())
+        x = measured[measured["method"] == claim.x]
+        y = measured[measured["method"] == claim.y]
         a, b = x[claim.measure].to_numpy(float), y[claim.measure].to_numpy(float)
         if claim.statistic == "share":
             assert row.effect == min(a.mean(), b.mean())
@@ -341,8 +342,7 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
         assert row.capped_x == (x["converged"] == 0).sum()
         assert row.capped == row.capped_x + (y["converged"] == 0).sum()
         assert row.outcome == _outcome(claim, row.effect, row.low, row.high)
-    second = {one: own for one, own in conditions.items() if one.choices}
-    some = effects_table(results, second, wanted)
+    some = effects_table(trials[trials["number"] == 1], list(conditions), wanted)
     assert some["claim"].tolist() == ["SAVES-OPEN", "Q-GROWS"]  # none has AdaBoost-IRL
     assert table[table["specification"] == "default"]["capped"].tolist() == [0] * 4
     assert (table[table["specification"] != "default"]["capped"] > 0).all()

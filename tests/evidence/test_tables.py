@@ -180,7 +180,7 @@ def test_marked_pairs_by_iteration(small_demos: Demos, store_path: Path) -> None
     )
     results = run_trials([condition], trials=1, store=Store(store_path), seed=5)
     trial = results.trial(condition, TRACED_TRIAL)
-    table = marked_table(results, condition)
+    table = marked_table(trial, condition)
     assert table["decisions"].tolist() == [len(episode.actions) for episode in trial.episodes]
     assert table["error"].tolist() == trial.errors.round(4).tolist()
     assert (table["again"] <= table["marked"]).all()

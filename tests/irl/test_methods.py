@@ -53,15 +53,15 @@ def test_a_new_method_is_one_row(
     conditions = method_conditions(small_demos, {"episodes": 60, "horizon": 40}, METHODS)
     every = list(conditions.values())
     results = run_trials(every, trials=3, store=Store(store_path), seed=1)
-    trials = measure_trials(results, every)
+    trials = measure_trials(results, every, errors=True)
     assert (trials["method"] == "perceptron").sum() == 3
     summary = summary_table(trials, {}).set_index("method")
     assert summary.loc["perceptron", "n"] == 3
     (compared,) = contrasts_table(trials).query("x == 'perceptron'").itertuples()
     assert (compared.y, compared.n) == ("adaboost", 3)
     for picture in (
-        curves.errors(results, conditions, {}),
-        curves.iterations(results, conditions, {}),
+        curves.errors(trials, {}),
+        curves.iterations(trials, {}),
     ):
         assert "Perceptron: " in picture.words
         (legend,) = picture.draw(picture.numbers).legends

@@ -50,7 +50,7 @@ def run(project: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 
     def run(*notebooks: Path, **options: Any) -> list[Published]:
         out = options.setdefault("out", project / "figures")
-        defaults: dict[str, Any] = {"profile": "paper", "jobs": 1}
+        defaults: dict[str, Any] = {"profile": "paper", "jobs": 1, "publish": True}
         try:
             return run_notebooks(notebooks, **defaults | options)
         finally:

@@ -54,7 +54,11 @@ def run(project: Path) -> Run:
     """Execute the notebook and return the executed one."""
 
     def run(
-        stage: str = "stage", target: str = "figures/toy", timeout: int = 60, **given: Any
+        stage: str = "stage",
+        target: str = "figures/toy",
+        timeout: int = 600,
+        settings: dict[str, str] | None = None,
+        **given: Any,
     ) -> bytes:
         (project / stage).mkdir(parents=True, exist_ok=True)
         with Display(1, bars=False) as display:
@@ -66,6 +70,7 @@ def run(project: Path) -> Run:
                 failed=project / "failed.ipynb",
                 timeout=timeout,
                 display=display,
+                settings=settings,
             )
         return text.encode()
 
@@ -198,13 +203,19 @@ def test_the_kernel_is_our_interpreter(
     assert json.loads(output.text) == expected
 
 
-def test_scheduler_reaches_the_notebook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The scheduler is the given one, else that of the user's environment, else none."""
+def test_settings_reach_the_notebook(project: Path, run: Run) -> None:
+    """Environment variables that are given are those of the kernel."""
+    write(project, f"import os\nprint(os.environ[{SCHEDULER!r}])")
+    (output,) = cells(run(settings={SCHEDULER: "tcp://given:1"}))[-1].outputs
+    assert output.text == "tcp://given:1\n"
+
+
+def test_a_scheduler_of_the_user_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The scheduler is that of the user's environment, else none."""
     monkeypatch.delenv(SCHEDULER, raising=False)
-    assert SCHEDULER not in _environment(tmp_path / "1", "")
+    assert SCHEDULER not in _environment(tmp_path / "1")
     monkeypatch.setenv(SCHEDULER, "tcp://mine:1")
-    assert _environment(tmp_path / "2", "")[SCHEDULER] == "tcp://mine:1"
-    assert _environment(tmp_path / "3", "tcp://given:1")[SCHEDULER] == "tcp://given:1"
+    assert _environment(tmp_path / "2")[SCHEDULER] == "tcp://mine:1"
 
 
 def test_progress_of_trials_leaves_no_trace(

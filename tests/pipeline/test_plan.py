@@ -58,7 +58,7 @@ def test_needs_that_cannot_be_met_are_refused(write: Any) -> None:
     """A notebook that is neither asked for nor published, unknown, or needs itself, is named."""
     maze = write(name="maze")
     judge = write(name="judge", parameters=NEEDS, needs=["maze"])
-    with pytest.raises(NotebookError, match=r"needs the outputs of maze in .*replicate run maze"):
+    with pytest.raises(NotebookError, match=r"needs the outputs of maze; .*run maze --out"):
         names(judge)
     assert names(judge, maze) == ["maze", "judge"]
     with pytest.raises(NotebookError, match=r"unknown notebook 'mace' \(did you mean 'maze'"):

@@ -20,8 +20,8 @@ from replication.files import write_file
 from replication.pipeline import publish
 from replication.pipeline.manifest import RUNS
 from replication.pipeline.notebook import NotebookError, RunError
-from replication.pipeline.run import Published, run_notebooks
-from replication.pipeline.verify import verify_outputs
+from replication.pipeline.run import Published, destination, run_notebooks
+from tests.notebooks import damage
 
 STORED = 'trials = 3\nalpha = 0.5\nseed = 1\njobs = 1\nstore = "build/trials.sqlite"\nout = "x"'
 WRITE = "[(folder / f'{name}.txt').write_text(f'{value}') for name in 'ab']"
@@ -111,6 +111,51 @@ def test_other_results_never_go_to_figures(
     ):
         with pytest.raises(NotebookError, match=named):
             run(toy(), **options)
+
+
+@pytest.mark.parametrize("change", ["seed", "cell", "data", "lock"])
+def test_an_edit_never_replaces_what_is_published(
+    toy: Any, run: Any, project: Path, begun: list[str], change: str
+) -> None:
+    """A run of an edited notebook, of other data or packages goes elsewhere unless told to."""
+    path = toy()
+    run(path)
+    before = {
+        file: file.read_bytes() for file in (project / "figures").rglob("*") if file.is_file()
+    }
+    if change == "seed":
+        path = toy(parameters=STORED.replace("seed = 1", "seed = 2"))
+    elif change == "cell":
+        path = toy("value = trials + 1")
+    elif change == "data":
+        (project / "data.toml").write_text("a = 2")
+    else:
+        (project / "environment.lock").write_text("numpy==2")
+    with pytest.raises(NotebookError, match=r"keeps what was published, as .* has changed since"):
+        run(path, publish=False)
+    assert begun == ["toy"]
+    assert before == {file: file.read_bytes() for file in before}
+    asked: dict[str, Any] = {"seed": None, "parameters": None}
+    folder, why = destination([path], profile="paper", publish=False, **asked)
+    assert folder == project / "build" / "edited"
+    assert "has changed since then; --publish replaces it" in why
+    assert destination([path], profile="paper", publish=True, **asked) == (project / "figures", "")
+    assert destination([path], profile="quick", publish=False, **asked)[1] == ""
+    run(path, out=folder, publish=False)
+    run(path, publish=True)
+    assert begun == ["toy"] * 3
+    run(path, publish=False)
+    assert destination([path], profile="paper", publish=False, **asked)[1] == ""
+
+
+def test_damage_is_mended_without_being_told_to(toy: Any, run: Any, project: Path) -> None:
+    """A published file that is changed or gone is made again: nothing was edited."""
+    path = toy()
+    run(path)
+    (project / "figures" / "toy" / "a.txt").write_text("mine")
+    assert destination([path], profile="paper", publish=False, seed=None, parameters=None)[1] == ""
+    run(path, publish=False)
+    assert (project / "figures" / "toy" / "a.txt").read_text() == "3"
 
 
 @pytest.mark.usefixtures("no_kernel")
@@ -278,7 +323,7 @@ def test_prose_is_rendered_and_not_executed(
     shown = nbformat.read(folder / "notebook.ipynb", as_version=4)
     assert [cell.source for cell in shown.cells] == [cell.source for cell in node.cells]
     assert shown.cells[3].execution_count == 3
-    assert list(verify_outputs(project / "figures")) == []
+    assert damage(project / "figures") == []
 
 
 def test_a_kill_while_text_is_rendered_costs_nothing(
@@ -302,7 +347,7 @@ def test_a_kill_while_text_is_rendered_costs_nothing(
         run(path)
         text = (project / "figures" / "toy" / "notebook.ipynb").read_text()
         assert f"Headline {allowed}" in text
-        assert list(verify_outputs(project / "figures")) == []
+        assert damage(project / "figures") == []
     assert begun == ["toy"]
 
 
@@ -329,7 +374,7 @@ def test_a_failure_leaves_what_was_published(
     monkeypatch.setenv("DIVISOR", "0")
     with pytest.raises(ZeroDivisionError):
         run(path, force=True)
-    assert list(verify_outputs(project / "figures")) == []
+    assert damage(project / "figures") == []
     run(path)
     assert begun == ["toy"] * 2
 
@@ -461,7 +506,7 @@ def test_publishing_is_all_or_nothing(
         with pytest.raises(RunError, match=r"cannot publish.*No space left"):
             run(toy("value = 9"))
     assert (project / "figures" / "toy" / "a.txt").read_text() == "3"
-    assert list(verify_outputs(project / "figures")) == []
+    assert damage(project / "figures") == []
 
 
 def test_what_killed_runs_left_is_put_right(

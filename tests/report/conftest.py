@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from replication import Demos
@@ -7,6 +8,7 @@ from replication.demos.soccer_expert import demonstrate_soccer
 from replication.envs.soccer.field import SoccerField
 from replication.evidence.experiments import Key, method_conditions, set_conditions
 from replication.trials.condition import Condition
+from replication.trials.measures import measure_trials
 from replication.trials.results import Results
 from replication.trials.run import run_trials
 from replication.trials.store import Store
@@ -41,3 +43,9 @@ def results(
     """Run a few trials of all of them."""
     store = Store(tmp_path_factory.mktemp("report") / "trials.sqlite")
     return run_trials([*conditions.values(), *sets.values()], trials=4, store=store, seed=2)
+
+
+@pytest.fixture(scope="session")
+def trials(conditions: dict[Key, Condition], results: Results) -> pd.DataFrame:
+    """Return the table of the methods' trials, with their errors."""
+    return measure_trials(results, conditions.values(), errors=True)

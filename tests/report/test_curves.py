@@ -17,6 +17,7 @@ from replication.report.curves import (
     sets,
 )
 from replication.trials.condition import Condition
+from replication.trials.measures import error_histories
 from replication.trials.results import Results
 
 Conditions = dict[Key, Condition]
@@ -47,46 +48,56 @@ SAVED = pd.DataFrame(
 )
 
 
-def test_errors_are_those_of_the_trials(conditions: Conditions, results: Results) -> None:
+def counts_of(trials: pd.DataFrame, method: str, reading: str) -> list[int]:
+    """Return the iterations of the trials of a method under a reading."""
+    own = trials[(trials["method"] == method) & (trials["reading"] == reading)]
+    return [int(count) for count in own["iterations"]]
+
+
+def test_errors_are_those_of_the_trials(
+    conditions: Conditions, results: Results, trials: pd.DataFrame
+) -> None:
     """Each condition has the drawn trial and the quartiles of all at each iteration."""
     for median in (False, True):
-        numbers = errors(results, conditions, {"unified": 47}, median=median).numbers
-        assert len(numbers) == sum(results.errors(one).shape[1] for one in conditions.values())
+        numbers = errors(trials, {"unified": 47}, median=median).numbers
         for (method, reading), condition in conditions.items():
             rows = numbers[(numbers["method"] == method) & (numbers["reading"] == reading)]
-            every = results.errors(condition)
-            trial = median_trial(results.iterations(condition)) if median else 0
+            curves = [results.trial(condition, k).errors for k in range(results.trials)]
+            every = np.array([np.pad(d, (0, len(rows) - len(d)), mode="edge") for d in curves])
+            counts = np.array(counts_of(trials, method, reading))
+            assert len(rows) == counts.max() + 1
+            trial = median_trial(counts) if median else 0
             assert set(rows["trial"]) == {trial}
-            assert rows["error"].tolist() == every[trial].tolist()
+            np.testing.assert_allclose(rows["error"], every[trial], rtol=1e-9)
             columns = rows[["quartile_1", "median", "quartile_3"]].to_numpy().T
-            np.testing.assert_array_equal(columns, np.quantile(every, [0.25, 0.5, 0.75], axis=0))
+            np.testing.assert_allclose(
+                columns, np.quantile(every, [0.25, 0.5, 0.75], axis=0), rtol=1e-9
+            )
             assert (rows["paper"] == 47).all() == (method == "unified")
 
 
-def test_iterations_are_those_of_the_trials(conditions: Conditions, results: Results) -> None:
+def test_iterations_are_those_of_the_trials(conditions: Conditions, trials: pd.DataFrame) -> None:
     """Every trial has a row with its count, how many are like it, our mean and the paper's."""
-    numbers = iterations(results, conditions, {"unified": TABLE_1["unified"]}).numbers
-    for (method, reading), condition in conditions.items():
+    numbers = iterations(trials, {"unified": TABLE_1["unified"]}).numbers
+    for method, reading in conditions:
         rows = numbers[(numbers["method"] == method) & (numbers["reading"] == reading)]
-        counts = results.iterations(condition).tolist()
+        counts = counts_of(trials, method, reading)
         assert rows["iterations"].tolist() == counts
         assert rows["trials_alike"].tolist() == [counts.count(n) for n in counts]
         assert set(rows["mean"]) == {np.mean(counts)}
         assert (rows["paper"] == 40.1).all() == (method == "unified")
 
 
-def test_a_method_without_a_trace_is_in_every_panel(
-    conditions: Conditions, results: Results
-) -> None:
+def test_a_method_without_a_trace_is_in_every_panel(trials: pd.DataFrame) -> None:
     """AdaBoost-IRL's line is drawn under both readings of Eq. 9, from the same rows."""
-    two = {key: conditions[key] for key in conditions if key[0] in ("adaboost", "unified")}
-    panels = draw_iterations(iterations(results, two, {}).numbers).axes[::2]
+    two = trials[trials["method"].isin(["adaboost", "unified"])]
+    panels = draw_iterations(iterations(two, {}).numbers).axes[::2]
     assert [panel.get_title(loc="left") for panel in panels] == ["Fᵢ (printed)", "Fᵢ₊₁ (updated)"]
     for panel in panels:
         colours = [line.get_color() for line in panel.lines]
         assert colours == [METHODS[name].colour for name in ("adaboost", "unified")]
     drawn = [np.asarray(panel.lines[0].get_ydata()).tolist() for panel in panels]
-    assert drawn[0] == drawn[1] == results.iterations(conditions["adaboost", ""]).tolist()
+    assert drawn[0] == drawn[1] == counts_of(trials, "adaboost", "")
 
 
 def test_traced_trial_ends_where_it_reaches_zero() -> None:
@@ -143,13 +154,11 @@ def test_no_sets_are_a_figure_too() -> None:
     assert panel.get_title() == "no incorrect demonstrations"
 
 
-def test_words_hold_the_numbers(conditions: Conditions, results: Results) -> None:
+def test_words_hold_the_numbers(trials: pd.DataFrame) -> None:
     """The alternative texts give when half of the trials are at zero, and the means."""
-    condition = conditions["unified", "printed"]
-    one = {("unified", "printed"): condition}
-    counts = results.iterations(condition)
+    one = trials[(trials["method"] == "unified") & (trials["reading"] == "printed")]
     name = "Unified, without incorrect, Fᵢ (printed)"
-    below = (np.median(results.errors(condition), axis=0) > 0).sum()
-    words = errors(results, one, {}).words
+    below = (np.median(error_histories(one), axis=0) > 0).sum()
+    words = errors(one, {}).words
     assert f"{name}: half of the trials are at zero after {below} iterations" in words
-    assert f"{name}: {counts.mean():.1f} on average" in iterations(results, one, {}).words
+    assert f"{name}: {one['iterations'].mean():.1f} on average" in iterations(one, {}).words

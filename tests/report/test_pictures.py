@@ -37,18 +37,20 @@ def pictures(
     conditions: dict[Key, Condition],
     sets: dict[Key, Condition],
     results: Results,
+    trials: pd.DataFrame,
 ) -> dict[str, Picture]:
     """Make each kind of picture once, of a few trials in a small maze and of the soccer field."""
-    saved = sets_table(measure_trials(results, results.conditions), sets)
+    every = [*conditions.values(), *sets.values()]
+    saved = sets_table(measure_trials(results, every).drop_duplicates(ignore_index=True), sets)
     traced = results.trial(conditions["unified", "printed"], 0, snapshots=True)
-    one = {("adaboost", ""): conditions["adaboost", ""]}
+    one = trials[trials["method"] == "adaboost"]
     return {
         "map": maze.demonstrations(small_demos),
         "map without incorrect": maze.demonstrations(small_demos.select("none")),
         "surfaces": maze.surfaces(traced, small_demos.environment, Report()),
-        "errors": curves.errors(results, conditions, FIGURE_5),
-        "errors of one": curves.errors(results, one, {}, median=True),
-        "iterations": curves.iterations(results, conditions, TABLE_1),
+        "errors": curves.errors(trials, FIGURE_5),
+        "errors of one": curves.errors(one, {}, median=True),
+        "iterations": curves.iterations(trials, TABLE_1),
         "sets": curves.sets(saved),
         "no sets": curves.sets(saved[saved["set"] == "none"]),
         "field": field.start(soccer_demos.environment),

@@ -26,6 +26,7 @@ from replication.report.readable import markdown, readable_verdicts
 from replication.trials.measures import measure_trials
 from replication.trials.run import run_trials
 from replication.trials.store import Store
+from replication.trials.table import Group, computed_table
 
 FIGURES = PROJECT / "figures"
 NOTEBOOKS = sorted((PROJECT / "notebooks").glob("*.ipynb"))
@@ -201,14 +202,9 @@ def test_published_sensitivity_is_what_the_code_computes(name: str, tmp_path: Pa
     plan = load_specifications()
     specifications = single_specifications(plan.mazes.single.choices)
     specification = next(each for each in specifications if each.name == name)
-    conditions = {specification: maze_conditions(specification, plan.iteration_cap)}
-    results = run_trials(
-        list(conditions[specification].values()),
-        trials=plan.mazes.single.trials,
-        store=Store(tmp_path / "s"),
-        jobs=JOBS,
-        seed=plan.root_seed,
-    )
+    conditions = list(maze_conditions(specification, plan.iteration_cap).values())
+    group = Group(conditions, plan.mazes.single.trials, {"number": 0})
+    trials = computed_table([group], store=Store(tmp_path / "s"), jobs=JOBS, seed=plan.root_seed)
     claims = [load_claims().by_id(id) for id in plan.mazes.claims]
     stored = read_table(FIGURES / "sensitivity" / "effects.csv")
     rows = stored[
@@ -216,7 +212,7 @@ def test_published_sensitivity_is_what_the_code_computes(name: str, tmp_path: Pa
         & (stored["group"] == "single")
         & stored["claim"].isin(plan.mazes.claims)
     ]
-    assert_same(rows, effects_table(results, conditions, claims))
+    assert_same(rows, effects_table(trials, [specification], claims))
 
 
 # --- the folder ------------------------------------------------------------------------------
