@@ -304,7 +304,10 @@ def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.redraw import redraw
 
-    redraw(out or outputs_folder(profile), names, draw=_drawn, echo=click.echo)
+    _catch_signals()
+    target = out or outputs_folder(profile)
+    files.check_writable(target)
+    redraw(target, names, draw=_drawn, echo=click.echo)
 
 
 def _drawn(code: str, table: Path) -> dict[str, bytes]:
@@ -387,6 +390,10 @@ def site(out: Path) -> None:
     """Build the report from the published results; nothing is executed."""
     from replication.site.build import build_site
 
+    _catch_signals()
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is not a folder; choose another one")
+    files.check_writable(out.absolute().parent)  # where the new site stands beside the old one
     first = build_site(_all_notebooks(), out, echo=click.echo)
     click.echo(f"open {first.resolve().as_uri()} in a browser")
 
@@ -422,8 +429,10 @@ def learn(
     from replication.fitting import fit
     from replication.irl import get_method
     from replication.paper.params import Params
-    from replication.report import maze, style
+    from replication.report.learned import fit_figure
+    from replication.report.style import save_figure
 
+    _catch_signals()
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
@@ -432,17 +441,20 @@ def learn(
     params = Params.of(incorrect="all", **parameters)
     with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")
-    result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
-    saved = result.save(f"{stem}.json")
-    figure = maze.fit_figure(demos, result.states, result.weights, result.errors)
-    style.save_figure(figure, stem, formats=("png",))
+    saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
+    _check_targets(saved, picture, source=file)
+    click.echo(f"{demos.task}, {method}: learning")
+    result = fit(demos, method=method, params=params, seed=seed)
+    result.save(saved)
+    figure = fit_figure(demos, result.actions, result.weights, result.errors)
+    save_figure(figure, stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     click.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
         f"d = {result.errors[-1]:.4g}"
     )
-    click.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
+    click.echo(f"result:  {_short(saved)}\npicture: {_short(picture)}")
 
 
 @demos_group.command(
@@ -474,6 +486,7 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
         maze = Maze.from_text(text)
     except MazeError as error:
         raise UserError(f"{map_file}: {error}") from error
+    _check_targets(out, source=map_file)
     demos = demonstrate(task, maze, params=params)
     save_demos(demos, out)
     kinds = [demo.kind for demo in demos.incorrect]
@@ -606,6 +619,16 @@ def _all_notebooks() -> list[Path]:
     if not paths:
         raise UserError(f"there is no notebook in {files.PROJECT / 'notebooks'}")
     return paths
+
+
+def _check_targets(*targets: Path, source: Path) -> None:
+    """Refuse files that could not be written, or would take their source's place."""
+    for path in targets:
+        if path.exists() and not path.is_file():
+            raise UserError(f"{path} cannot be written: it is not a regular file; choose another")
+        if path.exists() and path.samefile(source):
+            raise UserError(f"{path} would be overwritten; choose another --out")
+    files.check_writable(targets[0].parent)
 
 
 def _short(path: Path) -> str:
