@@ -7,7 +7,7 @@ One file because the commands are one surface: they share options, errors and si
 
 from __future__ import annotations
 
-import atexit
+import errno
 import json
 import math
 import os
@@ -32,10 +32,16 @@ from typing import Any, NoReturn
 import click
 
 from replication import files
-from replication.errors import UserError, unknown
+from replication.errors import UserError, show, unknown
 
 GRACE = 5.0
 """Grace period after Ctrl-C, in seconds: further signals are ignored during clean-up."""
+
+NO_ROOM = [os.strerror(number) for number in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)]
+"""How the messages of errors say that a disk is full, whichever cell's write finds out."""
+
+LEVELS = 10
+"""Levels of lists and objects that the value of a parameter may have."""
 
 
 class OneLineErrors(click.Group):
@@ -58,10 +64,18 @@ class OneLineErrors(click.Group):
         except UserError as error:
             _end(str(error))
         except OSError as error:
-            if error.filename is None:
-                raise
-            _end(f"{error.filename}: {(error.strerror or str(error)).lower()}")
+            reason = (error.strerror or str(error)).lower()
+            if error.filename is None:  # a full disk, a limit, no temporary folder
+                _end(f"the system refuses: {reason}", 1)
+            _end(f"{error.filename}: {reason}")
         sys.exit(code if isinstance(code, int) else 0)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse what no file of ours could hold and no terminal show."""
+        for word in args:
+            if any("\ud800" <= character <= "\udfff" for character in word):
+                raise UserError(f"{show(word)} is not Unicode text; give the file another name")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; click itself would report an interruption in two lines."""
@@ -86,9 +100,20 @@ def _values(_: click.Context, __: click.Parameter, pairs: Sequence[tuple[str, st
             raise UserError(f"-p {name} is given twice")
         try:
             values[name] = json.loads(text, parse_constant=_no_constant)
+            deep = _levels(values[name]) > LEVELS
         except ValueError:
-            values[name] = text
+            values[name], deep = text, False
+        except RecursionError:
+            deep = True
+        if deep:
+            raise UserError(f"-p {name} is nested too deeply; no parameter has {LEVELS} levels")
     return values
+
+
+def _levels(value: Any) -> int:
+    """Return how deeply a JSON value is nested."""
+    inner = value.values() if isinstance(value, dict) else value
+    return 1 + max(map(_levels, inner), default=0) if isinstance(value, dict | list) else 0
 
 
 def _no_constant(text: str) -> NoReturn:
@@ -144,6 +169,10 @@ def outputs_options(command: Callable[..., Any]) -> Callable[..., Any]:
 )
 def app() -> None:
     """Take the options that come before a command."""
+    try:
+        Path.cwd()
+    except OSError:
+        raise UserError("the working folder is gone; change to another one") from None
 
 
 @app.group("demos")
@@ -222,7 +251,7 @@ def run(
         kept = "finished notebooks" if force else "finished notebooks and trials"
         _end(f"interrupted; {kept} are kept, and the same command goes on from there", 130)
     except RunError as error:
-        if error.details:
+        if error.details and not any(reason in str(error) for reason in NO_ROOM):
             plain = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", error.details)
             click.echo(error.details if sys.stderr.isatty() else plain, err=True)
         _end(str(error), 1)
@@ -284,7 +313,10 @@ def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.redraw import redraw
 
-    redraw(out or outputs_folder(profile), names, draw=_drawn, echo=click.echo)
+    _catch_signals()
+    target = out or outputs_folder(profile)
+    files.check_writable(target)
+    redraw(target, names, draw=_drawn, echo=click.echo)
 
 
 def _drawn(code: str, table: Path) -> dict[str, bytes]:
@@ -395,6 +427,7 @@ def clean(profile: str, out: Path | None, dry_run: bool) -> None:
     """Remove outputs that no notebook declares any more."""
     from replication.pipeline import status
 
+    _catch_signals()
     status.clean(*_prepared(profile, out), dry_run=dry_run, echo=click.echo)
 
 
@@ -404,6 +437,10 @@ def site(out: Path) -> None:
     """Build the report from the published results; nothing is executed."""
     from replication.site.build import build_site
 
+    _catch_signals()
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out} is not a folder; choose another one")
+    files.check_writable(out.absolute().parent)  # where the new site stands beside the old one
     first = build_site(_all_notebooks(), out, echo=click.echo)
     click.echo(f"open {first.resolve().as_uri()} in a browser")
 
@@ -436,11 +473,13 @@ def learn(
     is reported as such, with exit code 0.
     """
     from replication.demos.files import load_demos
-    from replication.fit import fit
+    from replication.fitting import fit
     from replication.irl import get_method
     from replication.paper.params import Params
-    from replication.report import maze, style
+    from replication.report.learned import fit_figure
+    from replication.report.style import save_figure
 
+    _catch_signals()
     uses_incorrect = get_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
@@ -449,17 +488,20 @@ def learn(
     params = Params.of(incorrect="all", **parameters)
     with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")
-    result = fit(demos, method=method, params=params, seed=seed)
     stem = out / f"{demos.task}-{method}"
-    saved = result.save(f"{stem}.json")
-    figure = maze.fit_figure(demos, result.states, result.weights, result.errors)
-    style.save_figure(figure, stem, formats=("png",))
+    saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
+    _check_targets(saved, picture, source=file)
+    click.echo(f"{demos.task}, {method}: learning")
+    result = fit(demos, method=method, params=params, seed=seed)
+    result.save(saved)
+    figure = fit_figure(demos, result.actions, result.weights, result.errors)
+    save_figure(figure, stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     click.echo(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
         f"d = {result.errors[-1]:.4g}"
     )
-    click.echo(f"result:  {_short(saved)}\npicture: {_short(saved.with_suffix('.png'))}")
+    click.echo(f"result:  {_short(saved)}\npicture: {_short(picture)}")
 
 
 @demos_group.command(
@@ -482,6 +524,7 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     from replication.demos.maze_expert import Expert, demonstrate
     from replication.envs.maze import Maze, MazeError
 
+    _catch_signals()
     given: dict[str, Any] = {name: value for name, value in rules.items() if value is not None}
     params = Expert(**given)
     # a byte that is no UTF-8 becomes a character that the map refuses, with its place
@@ -490,6 +533,7 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
         maze = Maze.from_text(text)
     except MazeError as error:
         raise UserError(f"{map_file}: {error}") from error
+    _check_targets(out, source=map_file)
     demos = demonstrate(task, maze, params=params)
     save_demos(demos, out)
     kinds = [demo.kind for demo in demos.incorrect]
@@ -624,6 +668,16 @@ def _all_notebooks() -> list[Path]:
     return paths
 
 
+def _check_targets(*targets: Path, source: Path) -> None:
+    """Refuse files that could not be written, or would take their source's place."""
+    for path in targets:
+        if path.exists() and not path.is_file():
+            raise UserError(f"{path} cannot be written: it is not a regular file; choose another")
+        if path.exists() and path.samefile(source):
+            raise UserError(f"{path} would be overwritten; choose another --out")
+    files.check_writable(targets[0].parent)
+
+
 def _short(path: Path) -> str:
     """Show a path relative to the working folder where it lies below it."""
     absolute = path.resolve()
@@ -632,7 +686,7 @@ def _short(path: Path) -> str:
 
 
 def _catch_signals() -> None:
-    """Treat SIGTERM like Ctrl-C: kernel and workers stop, and drafts are removed."""
+    """Let Ctrl-C and SIGTERM raise: kernel and workers stop, and drafts are removed."""
     last = -math.inf
 
     def interrupt(*_: object) -> None:
@@ -643,8 +697,5 @@ def _catch_signals() -> None:
             raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # At exit Python restores the default handler; ignore the signal instead.
-        atexit.register(signal.signal, number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, interrupt)
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, interrupt)

@@ -6,6 +6,8 @@ import os
 import tempfile
 from pathlib import Path
 
+from replication.errors import UserError
+
 
 def write_file(path: str | os.PathLike[str], content: str | bytes) -> Path:
     """Write a whole file or leave what is there; the folder is made when missing.
@@ -57,3 +59,28 @@ def shown_as(path: Path) -> str:
     absolute = path.resolve()
     inside = absolute.is_relative_to(PROJECT)
     return absolute.relative_to(PROJECT).as_posix() if inside else path.name
+
+
+ROOM = 1_000_000
+"""Bytes that :func:`check_writable` asks for: more than most results take."""
+
+
+def check_writable(folder: Path) -> None:
+    """Make a folder, and check that it can be written and that the disk has room.
+
+    It is called before anything is computed, so that no result is lost.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as probe:  # is gone even if this is killed
+            probe.write(os.urandom(ROOM))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        if isinstance(error, FileExistsError | NotADirectoryError):
+            reason = "it is not a folder"
+        raise UserError(f"{folder} cannot be written: {reason}; choose another one") from None

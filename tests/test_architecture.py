@@ -16,7 +16,7 @@ MODULES = {
 GROUND = ("errors", "files", "source", "progress")
 FLOORS = (
     *("paper", "envs", "demos", "learning", "irl", "trials", "evidence", "report", "site"),
-    *("fit", "cli"),
+    *("fitting", "cli", "__main__"),
 )
 """The order of the argument: a part imports from those before it, and from the ground floor."""
 

@@ -1,7 +1,8 @@
 """The command line: what it prints, where it writes and how it ends."""
 
-import atexit
+import errno
 import json
+import os
 import re
 import resource
 import shlex
@@ -30,6 +31,11 @@ from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.pipeline import run
 from tests.notebooks import write_notebook
+
+COMMANDS = [
+    *(["run"], ["draw"], ["status"], ["verify"], ["clean"], ["site"], ["learn"], ["choices"]),
+    *(["demos", name] for name in ("make", "check", "schema")),
+]
 
 
 def replicate(*words: str | Path) -> Result:
@@ -224,7 +230,6 @@ def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.Monke
     handlers: dict[int, Callable[[], object]] = {}
     clock = [100.0]
     monkeypatch.setattr(signal, "signal", handlers.__setitem__)
-    monkeypatch.setattr(atexit, "register", lambda *_: None)
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     cli._catch_signals()
     interrupt = handlers[signal.SIGTERM]
@@ -435,6 +440,39 @@ def test_learn_refuses_in_one_line(demo_file: Path, tmp_path: Path) -> None:
     assert "small.json" in refused("learn", demo_file, "--out", demo_file / "below")
 
 
+def test_learn_takes_every_kind_of_task(tmp_path: Path) -> None:
+    """Soccer is learned and drawn, too."""
+    file = files.PROJECT / "data" / "demos" / "soccer.json"
+    cap = str(load_choices()["ITERATION-CAP"].range[0])  # type: ignore[index]
+    words = ["-p", "max_iterations", cap, "-p", "episodes", "10"]
+    result = replicate("learn", file, *words, "--out", tmp_path)
+    assert result.exit_code == 0
+    assert Fit.load(tmp_path / "soccer-unified-incorrect.json").iterations == int(cap)
+    picture = tmp_path / "soccer-unified-incorrect.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_learn_computes_nothing_that_it_cannot_save(
+    demo_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a file would not fit, or take the demonstrations' place, nothing is computed."""
+    monkeypatch.setattr("replication.fitting.fit", None)
+    assert "it is not a folder" in refused("learn", demo_file, "--out", demo_file)
+    target = tmp_path / "small-unified-incorrect.json"
+    target.mkdir()
+    assert "is not a regular file" in refused("learn", demo_file, "--out", tmp_path)
+    target.rmdir()
+    own = demo_file.rename(target)
+    assert "would be overwritten" in refused("learn", own, "--out", tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert "file too large" in refused("learn", own, "--out", tmp_path / "full")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert load_demos(own).task == "small"
+
+
 # --- demos and choices -----------------------------------------------------------------------
 
 
@@ -494,6 +532,13 @@ def test_make_refuses_in_one_line(tmp_path: Path) -> None:
     assert "cannot be written" in refused(
         "demos", "make", drawn, "--task", "mine", "--out", tmp_path
     )
+    assert "map.txt would be overwritten" in refused(
+        "demos", "make", drawn, "--task", "mine", "--out", drawn
+    )
+    os.mkfifo(tmp_path / "pipe")
+    assert "is not a regular file" in refused(
+        "demos", "make", drawn, "--task", "mine", "--out", tmp_path / "pipe"
+    )
     drawn.write_bytes(b"S.\xffG")
     assert "map.txt: unknown character" in refused("demos", "make", drawn, *rest)
     assert not out.exists()
@@ -544,6 +589,15 @@ def test_draw_without_outputs_draws_nothing(project: Path) -> None:
     assert "unknown figure 'fig05'" in refused("draw", "fig05")
 
 
+def test_draw_and_site_need_a_folder(project: Path, tmp_path: Path) -> None:
+    """A file in the place of the outputs or of the site is refused first, and stays."""
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for words in (["draw"], ["site"], ["draw", "--profile", "quick"]):
+        assert "not a folder" in refused(*words, "--out", file)
+    assert file.read_text() == "mine"
+
+
 # --- the rest --------------------------------------------------------------------------------
 
 
@@ -564,6 +618,59 @@ def test_faults_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPa
         result = replicate("demos", "schema")
         assert result.exit_code == code
         assert ("error: mine" in result.stderr) == (code == 2)
+
+
+def test_what_is_nested_too_deeply_is_refused(demo_file: Path) -> None:
+    """However deep a value is, and whether or not it ends, it is refused in one line."""
+    for levels in (cli.LEVELS + 1, 500, 50_000):
+        for text in ("[" * levels + "]" * levels, '{"a":' * levels + "1" + "}" * levels):
+            words: list[str | Path] = ["learn", demo_file, "-p", "alpha", text]
+            assert "-p alpha is nested too deeply" in refused(*words)
+    assert "-p alpha is nested too deeply" in refused("run", "-p", "alpha", "[" * 100_000)
+    assert cli._values(None, None, [("a", "[" * cli.LEVELS + "]" * cli.LEVELS)])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_names_are_unicode(command: list[str]) -> None:
+    """A path with bytes that are no text is refused in one line by every command."""
+    assert "'a\\udcff' is not Unicode text" in refused(*command, "a\udcff")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_working_folder_may_be_gone(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every command says so in one line."""
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    try:
+        assert "the working folder is gone" in refused(*command, "word")
+    finally:
+        os.chdir(tmp_path)
+
+
+def test_an_error_of_the_system_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk or a limit, met by a write that names no file, is no fault of the program."""
+
+    def full() -> None:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+
+    monkeypatch.setattr("replication.demos.schema.json_schema", full)
+    result = replicate("demos", "schema")
+    assert (result.exit_code, result.stderr) == (1, "error: the system refuses: file too large\n")
+
+
+def test_a_cell_without_room_is_one_line(kernel: Path) -> None:
+    """A cell that finds the disk full has no traceback, for its code is not at fault."""
+    path = kernel / "notebooks" / "toy.ipynb"
+    node = nbformat.read(path, as_version=4)
+    node.cells[1].source = "import errno, os\nraise OSError(errno.EFBIG, os.strerror(errno.EFBIG))"
+    nbformat.write(node, path)
+    result = replicate("run")
+    assert result.exit_code == 1
+    assert re.fullmatch(r"error: .* cell 2 failed: OSError: .*File too large\n", result.stderr)
 
 
 def test_misuse_is_one_line() -> None:

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import resource
 import threading
 from pathlib import Path
 
 import pytest
 
 from replication import files
-from replication.files import shown_as, write_file
+from replication.errors import UserError
+from replication.files import ROOM, check_writable, shown_as, write_file
 
 
 @pytest.mark.parametrize(
@@ -55,6 +57,28 @@ def test_a_write_that_fails_leaves_the_old_file(
     monkeypatch.undo()
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_that_can_be_written_is_made(tmp_path: Path) -> None:
+    """The check makes the folder and leaves nothing in it."""
+    check_writable(tmp_path / "new" / "folder")
+    assert list((tmp_path / "new" / "folder").iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    """A file in its place, and a disk without room, are named in one line, and nothing is left."""
+    (tmp_path / "file").touch()
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(UserError, match=r"file.* cannot be written: it is not a folder; .*"):
+            check_writable(folder)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM - 1, before[1]))
+    try:
+        with pytest.raises(UserError, match=r"full cannot be written: file too large; .*"):
+            check_writable(tmp_path / "full")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list((tmp_path / "full").iterdir()) == []
 
 
 def test_text_that_is_not_unicode_leaves_the_old_file(tmp_path: Path) -> None:

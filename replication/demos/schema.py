@@ -44,7 +44,8 @@ VERSION = 1
 # --- what a file holds -----------------------------------------------------------------------
 
 # Each kind of environment has a class of fields here, with its own `kind`, that can `build` the
-# environment; the environment can `describe` itself.
+# environment; the environment can `describe` itself. The schema does not take its descriptions from
+# docstrings, since Python can be told to drop those.
 
 
 class _Fields(BaseModel):
@@ -60,8 +61,14 @@ _Actions = Annotated[list[Annotated[str, Field(max_length=100)]], Field(fail_fas
 _States = Annotated[list[_Numbers], Field(fail_fast=True)]
 
 
-class MazeFields(_Fields):
-    """A maze; ``actions``, ``start`` and ``goal`` may be left out, as the map gives them."""
+class MazeFields(
+    _Fields,
+    json_schema_extra={
+        "description": "A maze; ``actions``, ``start`` and ``goal`` may be left out, "
+        "as the map gives them."
+    },
+):
+    """The fields of a maze."""
 
     kind: Literal["maze"]
     map: Annotated[
@@ -83,8 +90,13 @@ class MazeFields(_Fields):
         return maze
 
 
-class SoccerFields(_Fields):
-    """The soccer field; whatever is left out has its registered default."""
+class SoccerFields(
+    _Fields,
+    json_schema_extra={
+        "description": "The soccer field; whatever is left out has its registered default."
+    },
+):
+    """The fields of the soccer field."""
 
     kind: Literal["soccer"]
     actions: _Actions | None = None
@@ -118,16 +130,27 @@ def _check_given(field: str, given: list[Any] | None, derived: list[Any]) -> Non
         )
 
 
-class CorrectFields(_Fields):
-    """A trajectory from the start to the goal; ``states`` may be left out."""
+class CorrectFields(
+    _Fields,
+    json_schema_extra={
+        "description": "A trajectory from the start to the goal; ``states`` may be left out."
+    },
+):
+    """The fields of a correct demonstration."""
 
     name: _Name
     actions: _Actions
     states: _States | None = None
 
 
-class IncorrectFields(_Fields):
-    """A trajectory that shows a mistake of some ``kind``; ``states`` may be left out."""
+class IncorrectFields(
+    _Fields,
+    json_schema_extra={
+        "description": "A trajectory that shows a mistake of some ``kind``; ``states`` may be "
+        "left out."
+    },
+):
+    """The fields of an incorrect demonstration."""
 
     name: _Name
     kind: Annotated[str, Field(max_length=100, pattern=KIND)]
@@ -135,8 +158,11 @@ class IncorrectFields(_Fields):
     states: _States | None = None
 
 
-class DemoFile(_Fields):
-    """A task with its environment and its demonstrations."""
+class DemoFile(
+    _Fields,
+    json_schema_extra={"description": "A task with its environment and its demonstrations."},
+):
+    """The fields of a whole file."""
 
     format: Literal["replication-demos"]
     version: Literal[1]

@@ -1,4 +1,4 @@
-"""Pictures of mazes: demonstrations on the map, learned values as surfaces, and a fit.
+"""Pictures of mazes: demonstrations on the map, and learned values as surfaces.
 
 One file because in the numbers of all, as on the page, x goes right and y goes up, in cells from
 the lower left.
@@ -35,7 +35,6 @@ from replication.report.style import (
 )
 from replication.trials.measures import Report
 
-LEARNED_COLOUR = "#0072B2"
 TITLES = {
     "q_mid": "(a) Q after {} iterations",
     "q_end": "(b) Q at the end ({})",
@@ -51,7 +50,7 @@ def demonstrations(demos: Demos) -> Picture:
     maze = as_maze(demos.environment)
     parts = [map_numbers(maze)]
     for part in ("correct", "incorrect"):
-        parts += [_demo_numbers(maze, demo).assign(part=part) for demo in getattr(demos, part)]
+        parts += [demo_numbers(maze, demo).assign(part=part) for demo in getattr(demos, part)]
     numbers = pd.concat(parts, ignore_index=True)[["part", "kind", "demo", "step", "x", "y"]]
     words = f"Map of {demos.task} with a correct demonstration of "
     words += f"{len(demos.correct[0].actions)} moves"
@@ -76,7 +75,8 @@ def places(maze: Maze, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], ND
     return columns, maze.shape[0] - 1 - rows
 
 
-def _demo_numbers(maze: Maze, demo: Demo) -> pd.DataFrame:
+def demo_numbers(maze: Maze, demo: Demo) -> pd.DataFrame:
+    """Return where a demonstration is after each of its moves."""
     x, y = places(maze, demo.states)
     steps = np.arange(len(demo.states))
     return pd.DataFrame({"kind": demo.kind, "demo": demo.name, "step": steps, "x": x, "y": y})
@@ -98,7 +98,7 @@ def draw_demonstrations(numbers: pd.DataFrame) -> Figure:
         _draw_departure(axes[1], demo, on_path, KIND_COLOURS.get(kind, OTHER_KIND_COLOUR))
     for panel in axes:
         for _, demo in correct:
-            _draw_arrows(panel, demo)
+            draw_arrows(panel, demo)
     handles = [Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct")]
     kinds = pd.Series([kind for (kind, _), _ in incorrect], dtype=object)
     for kind, number in kinds.groupby(kinds, sort=False).size().items():
@@ -135,7 +135,8 @@ def draw_map(panel: Axes, numbers: pd.DataFrame, *, grid: bool = True) -> None:
     panel.tick_params(length=2)
 
 
-def _draw_arrows(panel: Axes, demo: pd.DataFrame) -> None:
+def draw_arrows(panel: Axes, demo: pd.DataFrame) -> None:
+    """Draw a correct demonstration as arrows."""
     x, y = demo["x"].to_numpy(), demo["y"].to_numpy()
     style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.007}
     style |= {"headwidth": 4.5, "headlength": 5, "headaxislength": 4.5}
@@ -234,37 +235,3 @@ def _face_colours(height: NDArray[np.float64]) -> NDArray[np.float64]:
     scaled = (top - np.nanmin(height)) / max(np.nanmax(height) - np.nanmin(height), 1e-300)
     colours: NDArray[np.float64] = mpl.colormaps["viridis"](scaled)
     return colours
-
-
-# --- a fit -----------------------------------------------------------------------------------
-
-
-@settled
-def fit_figure(
-    demos: Demos,
-    states: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    errors: NDArray[np.float64],
-) -> Figure:
-    """Draw what was learned: the map with demonstrations and path, the reward, and the errors.
-
-    `states` is the learned path, `weights` are `[state, action]`, `errors` is d by iteration.
-    """
-    maze = as_maze(demos.environment)
-    figure, axes = canvas(1, 3, height=3.0)
-    draw_map(axes[0], map_numbers(maze))
-    for demo in demos.correct:
-        _draw_arrows(axes[0], _demo_numbers(maze, demo))
-    path: dict[str, Any] = {"color": LEARNED_COLOUR, "lw": 4, "alpha": 0.45}
-    axes[0].plot(*places(maze, states), solid_capstyle="round", **path)
-    axes[0].set_title("learned path")
-    value = np.where(maze.free, weights.max(axis=1), np.nan).reshape(maze.shape)
-    image = axes[1].imshow(value[::-1], cmap="viridis", origin="lower")
-    axes[1].set(title="largest reward weight", xticks=[], yticks=[])
-    figure.colorbar(image, ax=axes[1], fraction=0.046)
-    axes[2].plot(errors, color=LEARNED_COLOUR)
-    axes[2].set(title="error d", xlabel="iteration", xlim=(0, None), ylim=(0, None))
-    axes[2].set_box_aspect(1)
-    demo_handle = Line2D([], [], color=CORRECT_COLOUR, marker=">", ms=4, label="correct demo")
-    legend_below(figure, [demo_handle, Line2D([], [], label="learned path", **path)])
-    return figure

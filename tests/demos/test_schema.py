@@ -1,7 +1,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,7 @@ import pytest
 from replication.demos import schema
 from replication.demos.checks import DemoError
 from replication.demos.schema import MazeFields, json_schema, read_fields
+from replication.files import PROJECT
 from tests.demos.example import DATA, EXAMPLE, MAZE, STORED, Changes, edited
 
 
@@ -114,6 +118,15 @@ def test_only_an_object_is_a_file(document: Any) -> None:
 def test_stored_schema_is_current() -> None:
     """The stored schema is the one that the program uses."""
     assert json.loads((DATA / "schema.json").read_text()) == json_schema()
+
+
+@pytest.mark.parametrize("level", ["0", "2"])
+def test_printed_schema_is_the_stored_one(level: str) -> None:
+    """Its bytes do not depend on whether Python keeps docstrings."""
+    words = [sys.executable, "-m", "replication", "demos", "schema"]
+    environment = os.environ | {"PYTHONOPTIMIZE": level}
+    done = subprocess.run(words, cwd=PROJECT, env=environment, capture_output=True, check=True)
+    assert done.stdout == (DATA / "schema.json").read_bytes()
 
 
 def test_schema_agrees_with_the_program() -> None:

@@ -83,7 +83,7 @@ print(len(rows), "numbers in", out)
 
 PROGRAM = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    "from replication.cli import app; app()"
+    "from replication.__main__ import main; main()"
 )
 
 SMALL = "\n".join((".......", ".....G.", "...#...", ".......", ".S.....", "......."))

@@ -1,6 +1,7 @@
 """Interruptions at every moment: driver and kernel end, and one line says so."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,14 +10,17 @@ from pathlib import Path
 
 import pytest
 
+from replication.files import PROJECT
 from tests.notebooks import write_notebook
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 
+SOCCER = str(PROJECT / "data" / "demos" / "soccer.json")
 PROGRAM = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    "import sys; from pathlib import Path; from replication import cli, files\n"
-    "files.PROJECT = Path(sys.argv.pop(1)); cli.app()"
+    "import sys; from pathlib import Path; from replication import files\n"
+    "from replication.__main__ import main\n"
+    "files.PROJECT = Path(sys.argv.pop(1)); main()"
 )
 
 
@@ -79,6 +83,63 @@ def test_a_run_that_starts_is_ended(tmp_path: Path, moment: float) -> None:
     interrupted(tmp_path / "toy", moment, starting=True)
 
 
+def ended_early(project: Path, pause: float, number: int, *words: str) -> None:
+    """Send a signal some time after the handlers are set; the command ends quietly."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(project), *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    mask = 0
+    while not mask >> (signal.SIGTERM - 1) & 1:
+        assert process.poll() is None
+        status = Path(f"/proc/{process.pid}/status").read_text()
+        mask = int(status.partition("SigCgt:")[2].split()[0], 16)
+    time.sleep(pause)
+    process.send_signal(number)
+    shown = process.communicate(timeout=120)[1]
+    assert process.returncode == 130, shown
+    assert re.fullmatch(r"error: interrupted(; .*)?\n", shown)
+
+
+def importing(project: Path, *pauses: float) -> None:
+    """Interrupt commands while they import; nothing is left."""
+    begin = "import time\ntime.sleep(300)"
+    write_notebook(project / "sleep.ipynb", begin)
+    (project / "environment.lock").touch()
+    for at, pause in enumerate(pauses):
+        number = (signal.SIGINT, signal.SIGTERM)[at % 2]
+        ended_early(project, pause, number, "run", str(project / "sleep.ipynb"))
+        ended_early(project, pause, number, "learn", SOCCER, "--out", str(project / "learn"))
+    assert list((project / "learn").glob("*")) == []
+
+
+def test_imports_are_ended(tmp_path: Path) -> None:
+    """Ctrl-C from the first moment on is one line: no import shows or swallows it."""
+    importing(tmp_path, *(0.07 * k for k in range(10)))
+
+
+def test_a_swallowed_interruption_is_repeated(tmp_path: Path) -> None:
+    """Where Python drops what a signal raises, as in `__del__`, it is raised once more."""
+    program = PROGRAM.replace(
+        "main()",
+        "from replication.pipeline import run\n"
+        "class Dropping:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGTERM)\n"
+        "def runs(*_, **__):\n"
+        "    Dropping()\n"
+        "    import time; time.sleep(300)\n"
+        "run.run_notebooks = runs\n"
+        "main()",
+    )
+    write_notebook(tmp_path / "notebooks" / "toy.ipynb", "1")
+    words = [sys.executable, "-c", program, str(tmp_path), "run"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 130
+    assert re.fullmatch(r"error: interrupted; .*\n", done.stderr)
+
+
 @pytest.mark.long
 def test_interruptions_at_many_moments(tmp_path: Path) -> None:
     """The same at many more moments."""
@@ -86,3 +147,4 @@ def test_interruptions_at_many_moments(tmp_path: Path) -> None:
         interrupted(tmp_path / f"cell-{k}", 0.85 + 0.01 * k, starting=False)
     for k in range(25):
         interrupted(tmp_path / f"start-{k}", 0.2 * k, starting=True)
+    importing(tmp_path, *(0.01 * k for k in range(100)))

@@ -18,6 +18,7 @@ from replication.evidence.experiments import Key
 from replication.evidence.tables import read_table, sets_table, write_csv
 from replication.paper.published import FIGURE_5, TABLE_1
 from replication.report import curves, field, maze
+from replication.report.learned import fit_figure
 from replication.report.picture import Picture
 from replication.report.style import save_figure
 from replication.trials.condition import Condition
@@ -70,12 +71,18 @@ def tables(
 
 @pytest.fixture(scope="module")
 def drawings(
-    pictures: dict[str, Picture], tables: dict[str, pd.DataFrame], small_demos: Demos
+    pictures: dict[str, Picture],
+    tables: dict[str, pd.DataFrame],
+    small_demos: Demos,
+    soccer_demos: Demos,
 ) -> dict[str, Figure]:
     """Draw each picture from its file, and what was learned from a user's own demonstrations."""
     weights, errors = np.linspace(-1, 1, 42 * 4).reshape(42, 4), np.linspace(2, 0, 9)
-    own = maze.fit_figure(small_demos, small_demos.correct[0].states, weights, errors)
-    return {"fit": own, **{kind: pictures[kind].draw(tables[kind]) for kind in pictures}}
+    fits = {
+        "fit": fit_figure(small_demos, small_demos.correct[0].actions, weights, errors),
+        "soccer fit": fit_figure(soccer_demos, soccer_demos.incorrect[0].actions, weights, errors),
+    }
+    return {**fits, **{kind: pictures[kind].draw(tables[kind]) for kind in pictures}}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -98,7 +105,7 @@ def test_a_picture_is_redrawn_by_its_code_and_its_file(
     assert np.abs(shades[0] - shades[1]).max() <= 1
 
 
-@pytest.mark.parametrize("kind", ["map", "fit"])
+@pytest.mark.parametrize("kind", ["map", "fit", "soccer fit"])
 def test_files_depend_on_the_figure_alone(
     kind: str, drawings: dict[str, Figure], tmp_path: Path
 ) -> None:
@@ -112,7 +119,7 @@ def test_files_depend_on_the_figure_alone(
     assert b"dc:date" not in once[1]
 
 
-@pytest.mark.parametrize("kind", [*KINDS, "fit"])
+@pytest.mark.parametrize("kind", [*KINDS, "fit", "soccer fit"])
 def test_nothing_is_cut_off_or_covered(kind: str, drawings: dict[str, Figure]) -> None:
     """All that is drawn lies within the figure, and no legend covers a panel or its labels."""
     figure = drawings[kind]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from replication import Demos, Fit, Params, fit
-from replication.fit import FitError
+from replication.fitting import FitError
 from replication.trials.condition import Condition
 from replication.trials.run import run_trials
 from replication.trials.store import Store
