@@ -367,20 +367,44 @@ def test_verify_answers_by_its_exit_code(project: Path) -> None:
     """Everything that is wrong has a line on stderr, and any of it makes the code 1."""
     result = replicate("verify")
     assert result.exit_code == 1
-    assert "nothing can be proved" in result.stderr
+    assert "toy: nothing is published" in result.stderr
     assert replicate("run").exit_code == 0
     result = replicate("verify")
     assert (result.exit_code, result.stderr) == (0, "")
+    assert "toy: made again, 3 files have the same bytes\n" in result.stdout
     assert result.stdout.endswith("everything agrees\n")
+    assert replicate("verify", "toy").exit_code == 0
     (project / "figures" / "toy" / "seen.md").write_text("mine")
     (project / "environment.lock").write_text("numpy==0.1\n")
     result = replicate("verify")
     assert result.exit_code == 1
     first, second, third = result.stderr.splitlines()
-    assert first == "error: toy/seen.md is changed since its run"
+    assert first.startswith("error: numpy ")
     assert second == "error: toy is stale: environment.lock has changed"
-    assert third.startswith("error: numpy ")
+    assert third == "error: toy/seen.md is changed since its run"
     assert result.stdout.endswith("3 things do not agree\n")
+
+
+def test_an_edited_notebook_goes_elsewhere_and_says_so(project: Path) -> None:
+    """What is published is replaced only if --publish is given; --check has nothing to compare."""
+    assert replicate("run").exit_code == 0
+    seen = project / "figures" / "toy" / "seen.md"
+    before = seen.read_bytes()
+    path = project / "notebooks" / "toy.ipynb"
+    node = nbformat.read(path, as_version=4)
+    node.cells[-1].source += "\nedited = 1"
+    nbformat.write(node, path)
+    assert "the notebook's code has changed" in refused("run", "--check")
+    result = replicate("run")
+    assert result.exit_code == 0
+    assert "the notebook's code has changed since then; --publish replaces it" in result.stdout
+    assert (project / "build" / "edited" / "toy" / "seen.md").exists()
+    assert "outputs (2 new): " in result.stdout
+    assert "keeps what was published" in refused("run", "--out", project / "figures")
+    assert seen.read_bytes() == before
+    assert "toy: stale" in replicate("status").stdout
+    assert replicate("run", "--publish").exit_code == 0
+    assert "toy: fresh" in replicate("status").stdout
 
 
 def test_clean_removes_what_no_notebook_declares(project: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from replication.errors import UserError
 from replication.evidence.claims import Claim, ClaimError, Claims, Judging, criteria_hash
 from replication.evidence.experiments import EXPERIMENTS, main_trials, under
 from replication.evidence.statistics import (
@@ -34,9 +35,23 @@ NOT_TESTABLE = "not testable"
 
 
 def read_trials(figures: Path) -> pd.DataFrame:
-    """Return the tables ``trials.csv`` of all experiments, one below the other."""
+    """Return the tables ``trials.csv`` of all experiments, one below the other.
+
+    Raises
+    ------
+    UserError
+        If they do not come from one root seed.
+    """
     folders = [figures / task.replace("-", "_") for task in EXPERIMENTS]
-    return pd.concat([read_table(folder / "trials.csv") for folder in folders], ignore_index=True)
+    tables = [read_table(folder / "trials.csv") for folder in folders]
+    trials = pd.concat(tables, ignore_index=True)
+    if trials["seed"].nunique() > 1:
+        seeds = ", ".join(
+            f"{folder.name} {table['seed'].iloc[0]}"
+            for folder, table in zip(folders, tables, strict=True)
+        )
+        raise UserError(f"{figures}: the root seeds differ ({seeds}); use one for all")
+    return trials
 
 
 def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:

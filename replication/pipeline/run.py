@@ -20,7 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from replication import files
-from replication.files import write_file
+from replication.files import check_writable, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import (
     EDITED,
@@ -176,6 +176,8 @@ def _check(runs: Sequence[Run], checks: Mapping[str, Callable[[], object]], sche
         checks[name]()
     for run in runs:
         run.notebook.load()  # refuses one that is not valid before the first one runs
+        for folder in (Path(tempfile.gettempdir()), run.out, store_of(run).parent):
+            check_writable(folder)
     address = scheduler or os.environ.get(SCHEDULER, "")
     if not runs or not address:
         return

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
+from replication.errors import UserError
 from replication.evidence.claims import (
     MEASURES,
     Claim,
@@ -19,6 +21,7 @@ from replication.evidence.claims import (
     criteria_hash,
     load_claims,
 )
+from replication.evidence.experiments import EXPERIMENTS
 from replication.evidence.statistics import (
     compare,
     holm,
@@ -26,6 +29,7 @@ from replication.evidence.statistics import (
     sd_prediction,
     share_interval,
 )
+from replication.evidence.tables import write_csv
 from replication.evidence.verdicts import (
     NOT_REPRODUCED,
     NOT_TESTABLE,
@@ -38,6 +42,7 @@ from replication.evidence.verdicts import (
     judge_claims,
     judged_trials,
     overall,
+    read_trials,
 )
 from replication.irl import READINGS, get_method
 
@@ -479,3 +484,14 @@ def test_frozen_numbers_judge() -> None:
     one = Claims(judging=lax, explored=(), claim=(faster(),))
     assert judge_claims(measures, one)["verdict"].item() == REPRODUCED
     assert verdict(measures, faster())[0] == NOT_TESTABLE
+
+
+def test_trials_of_one_seed_are_judged_together(tmp_path: Path) -> None:
+    """Experiments that were run with different root seeds are refused, each with its seed."""
+    for number, task in enumerate(EXPERIMENTS):
+        table = pd.DataFrame({"task": [task], "seed": 5, "iterations": number})
+        write_csv(table, tmp_path / task.replace("-", "_") / "trials.csv")
+    assert read_trials(tmp_path)["iterations"].tolist() == [0, 1, 2]
+    write_csv(table.assign(seed=6), tmp_path / "soccer" / "trials.csv")
+    with pytest.raises(UserError, match=r"open_maze 5, obstacle_maze 5, soccer 6\); use one"):
+        read_trials(tmp_path)

@@ -24,6 +24,7 @@ from replication.trials.measures import (
     Report,
     early_errors,
     early_iterations,
+    error_histories,
     marked_pairs,
     measure,
     measure_trials,
@@ -256,11 +257,16 @@ def test_there_is_a_row_for_each_trial_and_method(small_demos: Demos, results: R
     assert set(table[table["method"] == "adaboost"]["reading"]) == {""}
 
 
-def test_no_row_stands_twice(small_demos: Demos, results: Results) -> None:
-    """A condition of the sets that is a main condition, too, has its rows once."""
-    conditions = [*method_conditions(small_demos, FEW).values()]
-    table = measure_trials(results, conditions)
-    assert measure_trials(results, [*conditions, *conditions[1:3]]).equals(table)
+def test_histories_are_read_back(small_demos: Demos, results: Results) -> None:
+    """Each trial's errors are in its row, to ten digits; after its end it keeps its last one."""
+    conditions = method_conditions(small_demos, FEW)
+    table = measure_trials(results, conditions.values(), errors=True)
+    trials = [results.trial(one, k) for one in conditions.values() for k in range(3)]
+    histories = error_histories(table)
+    assert histories.shape == (len(trials), max(trial.iterations for trial in trials) + 1)
+    for row, trial in zip(histories, trials, strict=True):
+        np.testing.assert_allclose(row[: trial.iterations + 1], trial.errors, rtol=1e-9)
+        assert (row[trial.iterations :] == trial.errors[-1]).all()
 
 
 def test_trials_survive_their_file(small_demos: Demos, results: Results, tmp_path: Path) -> None:
