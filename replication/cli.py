@@ -438,7 +438,7 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     given: dict[str, Any] = {name: value for name, value in rules.items() if value is not None}
     params = Expert(**given)
     # a byte that is no UTF-8 becomes a character that the map refuses, with its place
-    text = map_file.read_text(encoding="utf-8-sig", errors="replace")
+    text = files.read_file(map_file, 1_000_000).decode("utf-8-sig", errors="replace")
     try:
         maze = Maze.from_text(text)
     except MazeError as error:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 
 import joblib
 import pandas as pd
 
 from replication.evidence.experiments import EXPERIMENTS, condition_of
+from replication.files import read_file
 from replication.trials.compute import compute, trial_key
 from replication.trials.results import digest
 from replication.trials.run import workers
@@ -84,7 +86,7 @@ def sampled_trials(table: Path) -> pd.DataFrame:
     OSError, ValueError, KeyError
         If the file cannot be read, or does not hold numbered trials.
     """
-    trials = pd.read_csv(table, keep_default_na=False)[list(COLUMNS)]
+    trials = pd.read_csv(BytesIO(read_file(table)), keep_default_na=False)[list(COLUMNS)]
     trials = trials[trials["task"].isin(list(EXPERIMENTS))]
     sample = trials.iloc[::EVERY].astype({"trial": int, "seed": int})
     if not (sample["trial"].between(0, len(trials) - 1) & (sample["seed"] >= 0)).all():

@@ -11,7 +11,6 @@ import json
 import os
 import socket
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from replication.files import write_file
+from replication.files import read_text, scratch_folder, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import check_profile, exclusive, failed_notebook, store_file
 from replication.pipeline.index import write_index
@@ -157,12 +156,11 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
         values["results"] = str(run.out.resolve())
     with (
         draft_folder(run.out) as stage,
-        # A kernel that is being killed may still write there.
-        tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch,
+        scratch_folder() as scratch,
     ):
         if "store" in notebook.literals:
             store = store_file(values.get("store", notebook.literals["store"]), run.out)
-            values["store"] = str(Path(scratch) / "trials.sqlite" if force else store)
+            values["store"] = str(scratch / "trials.sqlite" if force else store)
         failed = failed_notebook(run.name, run.out)
         folders = {stage.resolve(): run.folder, run.out.resolve(): run.out}
         try:
@@ -201,7 +199,7 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
 def render_text(run: Run) -> None:
     """Bring the text of a published notebook up to date; nothing is executed."""
     published = run.folder / EXECUTED
-    before = published.read_text(encoding="utf-8")
+    before = read_text(published)
     if run.notebook.shows(before):
         return
     from replication.pipeline.rendering import rendered  # loads nbformat

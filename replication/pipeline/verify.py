@@ -10,6 +10,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from replication.files import read_text
 from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.inputs import changes
 from replication.pipeline.manifest import damaged, published_folders, read_manifest
@@ -41,7 +42,7 @@ def verify_inputs(runs: Sequence[Run], out: Path) -> Iterator[str]:
 
 def verify_packages(lock: Path) -> Iterator[str]:
     """Yield how the installed packages differ from those that are pinned in a lock file."""
-    for line in lock.read_text(encoding="utf-8").splitlines():
+    for line in read_text(lock).splitlines():
         if not re.match(r"[A-Za-z0-9]", line):
             continue
         pin = Requirement(line.split("\\")[0].strip())

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from replication.envs.environment import Environment
 from replication.envs.soccer.field import as_soccer
 from replication.envs.soccer.replay import replay
-from replication.files import write_file
+from replication.files import read_file, write_file
 from replication.irl import Trial
 from replication.report.moving import Player, player
 from replication.report.pitch import BLUE, PINK, YELLOW, Movers, draw_pitch, obstacle_columns
@@ -46,7 +46,7 @@ class Film:
         with tempfile.TemporaryDirectory() as folder, style():
             draft = Path(folder) / "draft.gif"
             self.animation.save(draft, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=DPI)
-            return write_file(path, draft.read_bytes())
+            return write_file(path, read_file(draft))
 
 
 def turning_points(trial: Trial) -> dict[str, Iterable[int]]:
