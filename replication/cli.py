@@ -17,7 +17,6 @@ import shlex
 import shutil
 import signal
 import sys
-import tempfile
 import textwrap
 import time
 import warnings
@@ -328,8 +327,8 @@ def _drawn(code: str, table: Path) -> dict[str, bytes]:
     if not module.startswith("replication."):
         raise UserError("only functions of the package draw")
     figure = getattr(import_module(module), name)(read_table(table))
-    with tempfile.TemporaryDirectory() as folder:
-        paths = save_figure(figure, Path(folder) / "figure", ("png", "svg"))
+    with files.scratch_folder() as folder:
+        paths = save_figure(figure, folder / "figure", ("png", "svg"))
         return {path.suffix: path.read_bytes() for path in paths}
 
 
@@ -397,9 +396,9 @@ def _disagreements(
         yield from wrong
         sound += [] if wrong else [run]
     for run in sound:
-        with tempfile.TemporaryDirectory(prefix="replicate-") as scratch:
+        with files.scratch_folder() as scratch:
             yield from verify.verify_outputs(
-                run, Path(scratch).resolve(), timeout=timeout, echo=click.echo
+                run, scratch.resolve(), timeout=timeout, echo=click.echo
             )
     root = secrets.randbits(32) if seed is None else seed
 
@@ -528,7 +527,7 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     given: dict[str, Any] = {name: value for name, value in rules.items() if value is not None}
     params = Expert(**given)
     # a byte that is no UTF-8 becomes a character that the map refuses, with its place
-    text = map_file.read_text(encoding="utf-8-sig", errors="replace")
+    text = files.read_file(map_file, 1_000_000).decode("utf-8-sig", errors="replace")
     try:
         maze = Maze.from_text(text)
     except MazeError as error:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from replication.demos.files import demos_document, parse_demos
 from replication.demos.model import Demos
 from replication.errors import UserError
-from replication.files import write_file
+from replication.files import FileError, read_json, write_file
 from replication.irl import run
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
@@ -88,7 +88,7 @@ class Fit:
             If the file holds no fit of this version.
         """
         try:
-            document: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+            document: dict[str, Any] = read_json(path)
             if (document["format"], document["version"]) != (FORMAT, VERSION):
                 raise ValueError(f"it is not a {FORMAT} file of version {VERSION}")
             arrays: dict[str, Any] = {
@@ -102,7 +102,9 @@ class Fit:
                 converged=document["converged"],
                 **arrays,
             )
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except FileError as error:
+            raise FitError(str(error)) from None
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise FitError(f"{path}: cannot be read as a fit ({error!r}); save it again") from None
 
 

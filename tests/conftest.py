@@ -1,15 +1,23 @@
 from __future__ import annotations
 
+import os
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import pytest
+from hypothesis import HealthCheck, settings
 
 from replication import Demos, Maze, demonstrate, files, load_demos
 from replication.files import PROJECT
 from replication.pipeline import execute as execution
 from replication.pipeline.notebook import Notebook
+
+# A slow machine fails no test.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 SMALL = """
     .......
@@ -37,6 +45,35 @@ def stored_demos(request: pytest.FixtureRequest) -> Demos:
 def soccer_demos() -> Demos:
     """Load the stored demonstrations of soccer."""
     return load_demos(PROJECT / "data" / "demos" / "soccer.json")
+
+
+Spoil = Callable[[Path], None]
+
+
+@pytest.fixture(params=["pipe", "device", "folder", "large", "nested", "bytes"])
+def spoil(request: pytest.FixtureRequest) -> Spoil:
+    """Return a function that puts something in a file's place which no reader can use."""
+
+    def spoil(path: Path) -> None:
+        if path.is_dir():
+            shutil.rmtree(path)
+        path.unlink(missing_ok=True)
+        match request.param:
+            case "pipe":
+                os.mkfifo(path)
+            case "device":
+                path.symlink_to("/dev/zero")
+            case "folder":
+                path.mkdir()
+            case "large":
+                path.touch()
+                os.truncate(path, 2 * 10**9)  # a hole, which takes no space on the disk
+            case "nested":
+                path.write_text("[" * 100_000)
+            case "bytes":
+                path.write_bytes(b"\xb8")
+
+    return spoil
 
 
 @pytest.fixture

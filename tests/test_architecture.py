@@ -29,6 +29,22 @@ MAY_IMPORT = {
     "cli": (*GROUND, "pipeline", *FLOORS),
 }
 
+METHODS = (".open", ".fdopen", ".read_text", ".read_bytes")
+FUNCTIONS = ("open", "json.load", "json.loads", "nbformat.read", "np.load", "pd.read_csv")
+"""What opens a file, or reads JSON of any depth."""
+
+MAY_OPEN = {
+    "replication.files": "is the door",
+    "replication.source": "reads the package's code",
+    "replication.paper.register": "reads a resource of the package",
+    "replication.demos.strict_json": "is stricter",
+    "replication.trials.store": "reads what SQLite returns",
+    "replication.progress": "reads what a kernel of ours wrote",
+    "replication.pipeline.driver": "reads the scratch folder of its run",
+    "replication.pipeline.execute": "reads the scratch folder of its run",
+    "replication.cli": "reads its options and what it has just written",
+}
+
 SCIENCE = ("paper/register.py", "paper/params.py", "envs/maze.py", "learning/reference.py")
 
 
@@ -53,6 +69,23 @@ def part(module: str) -> str:
 def test_arrows_go_one_way(module: str) -> None:
     """A module imports only from its own part of the package and from the parts below."""
     assert {part(name) for name in imported(MODULES[module])} <= set(MAY_IMPORT[part(module)])
+
+
+def opens(node: ast.AST) -> bool:
+    """Return whether some code opens a file or reads JSON; not if it is made in the same place."""
+    if not isinstance(node, ast.Call):
+        return False
+    name = ast.unparse(node.func)
+    given = ast.unparse(node.args[0]) if node.args else ""
+    made = given.startswith(("BytesIO(", "io.BytesIO(", "json.dumps("))
+    return (name.endswith(METHODS) or name in FUNCTIONS) and not made
+
+
+@pytest.mark.parametrize("module", sorted(MODULES.keys() - MAY_OPEN.keys()))
+def test_files_have_one_door(module: str) -> None:
+    """What a user may have put somewhere is read through `replication.files` alone."""
+    tree = ast.parse(MODULES[module].read_bytes())
+    assert [ast.unparse(node) for node in ast.walk(tree) if opens(node)] == []
 
 
 def test_no_two_modules_import_each_other() -> None:

@@ -197,7 +197,7 @@ def test_refusal_in_a_cell_is_one_line(kernel: Path) -> None:
     node = nbformat.read(path, as_version=4)
     node.cells[1].source = "from replication import load_demos\nload_demos('none.json')"
     nbformat.write(node, path)
-    assert "none.json: cannot be read by toy: no such" in refused("run", "-p", "name", "none.json")
+    assert "none.json: cannot be read (no such" in refused("run", "-p", "name", "none.json")
     result = replicate("run")
     assert result.exit_code == 2
     line = r"error: .*toy\.ipynb: none\.json: cannot be read \(no such file or directory\)\n"
@@ -243,7 +243,7 @@ def test_an_interruption_that_was_lost_can_be_repeated(monkeypatch: pytest.Monke
 
 
 def test_what_is_fresh_is_not_run(project: Path) -> None:
-    """Help and a second run, which has nothing to do, take under 3 s and load nothing slow."""
+    """Help and a second run, which has nothing to do, load nothing that takes long."""
     assert replicate("run").exit_code == 0
     code = (
         "import sys; from pathlib import Path; from replication import cli, files\n"
@@ -253,10 +253,7 @@ def test_what_is_fresh_is_not_run(project: Path) -> None:
         f"files.PROJECT = Path({str(project)!r}); cli.app(['run'], standalone_mode=False)\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
-    began = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert ended.ru_utime - began.ru_utime < 3
     lines = done.stdout.splitlines()
     assert "outputs (0 new): " in lines[-2]
     assert "[]\ntoy: fresh, nothing to do\n" in done.stdout
@@ -551,7 +548,11 @@ def test_make_refuses_in_one_line(tmp_path: Path) -> None:
     rest: list[str | Path] = ["--task", "mine", "--out", out]
     assert "choice DEMO-SHAPE" in refused("demos", "make", drawn, *rest, "--leg", "0")
     assert "DETOUR-WIDTH" in refused("demos", "make", drawn, *rest, "--detour-width", "-1")
-    assert "none.txt: no such file" in refused("demos", "make", tmp_path / "none.txt", *rest)
+    assert "none.txt: cannot be read (no s" in refused(
+        "demos", "make", tmp_path / "none.txt", *rest
+    )
+    os.mkfifo(tmp_path / "pipe")
+    assert "pipe: is not a regular file" in refused("demos", "make", tmp_path / "pipe", *rest)
     assert "letters, digits" in refused("demos", "make", drawn, "--task", "a b", "--out", out)
     assert "cannot be written" in refused(
         "demos", "make", drawn, "--task", "mine", "--out", tmp_path

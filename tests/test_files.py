@@ -1,6 +1,13 @@
 from __future__ import annotations
 
+import os
+import re
 import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
 import threading
 from pathlib import Path
 
@@ -8,7 +15,96 @@ import pytest
 
 from replication import files
 from replication.errors import UserError
-from replication.files import ROOM, check_writable, shown_as, write_file
+from replication.files import (
+    DEEPEST,
+    ROOM,
+    FileError,
+    check_writable,
+    parse_json,
+    read_file,
+    read_json,
+    read_text,
+    scratch_folder,
+    shown_as,
+    write_file,
+)
+from tests.conftest import Spoil
+
+# --- reading ---------------------------------------------------------------------------------
+
+
+def test_what_is_no_file_of_ours_is_refused_at_once(tmp_path: Path, spoil: Spoil) -> None:
+    """A pipe, a device, a folder, a huge file, and JSON that is none, have one line each."""
+    spoil(tmp_path / "file.json")
+    with pytest.raises(FileError, match=r"file\.json: (is|cannot be) [^\n]+") as caught:
+        read_json(tmp_path / "file.json")
+    assert str(caught.value).isprintable()
+    assert str(caught.value) == f"{tmp_path / 'file.json'}: {caught.value.reason}"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("none", "none: cannot be read (no such file or directory)"),
+        ("a\0b", r"a\x00b': cannot be read"),
+        ("x" * 5000, "cannot be read (file name too long)"),
+        ("\ud800", r"\ud800': cannot be read"),
+    ],
+)
+def test_what_is_not_there_is_refused(tmp_path: Path, name: str, message: str) -> None:
+    """A file that does not exist, and cannot, is named in one line that any terminal shows."""
+    with pytest.raises(FileError, match=re.escape(message)) as caught:
+        read_file(f"{tmp_path}/{name}")
+    assert str(caught.value).isprintable()
+
+
+def test_no_more_is_read_than_is_allowed(tmp_path: Path) -> None:
+    """A file of just the allowed size is read, a byte more is refused."""
+    path = write_file(tmp_path / "file", b"0" * 1000)
+    assert read_file(path, 1000) == b"0" * 1000
+    assert read_file(str(path)) == b"0" * 1000
+    with pytest.raises(FileError, match=r"file: is larger than .*; give a smaller file"):
+        read_file(path, 999)
+
+
+def test_text_is_utf_8(tmp_path: Path) -> None:
+    """Other bytes are refused with their place."""
+    assert read_text(write_file(tmp_path / "file", "a\r\nä")) == "a\r\nä"
+    with pytest.raises(FileError, match=r"file: is not UTF-8 text \(byte 2\); save it as UTF-8"):
+        read_text(write_file(tmp_path / "file", b"a\xff"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "Expecting value"),
+        ('{"a": 1, "b": {"c": 1, "c": 2}}', "the field 'c' appears twice in one object; keep one"),
+        ("[" * 100_000, "it is nested too deeply"),
+        ('{"a":' * 100_000 + "1" + "}" * 100_000, "it is nested too deeply"),
+        ("[" * (DEEPEST + 1) + "]" * (DEEPEST + 1), "it is nested too deeply; 100 levels"),
+    ],
+)
+def test_json_with_a_doubtful_meaning_is_refused(text: str, message: str) -> None:
+    """What is no JSON, says two things, or is deeper than any reader goes is one line."""
+    for content in (text, text.encode()):
+        with pytest.raises(ValueError, match=re.escape(message)) as caught:
+            parse_json(content)
+        assert "\n" not in str(caught.value)
+
+
+def test_json_is_read_as_elsewhere() -> None:
+    """As many levels as are allowed, and a byte order mark, do no harm."""
+    assert parse_json('{"a": [1, 2.5, null], "b": {"a": "ä"}}') == {
+        "a": [1, 2.5, None],
+        "b": {"a": "ä"},
+    }
+    assert parse_json(b"\xef\xbb\xbf3") == 3
+    assert parse_json("[" * DEEPEST + "]" * DEEPEST)
+    with pytest.raises(UnicodeDecodeError):
+        parse_json("3".encode("utf-16"))
+
+
+# --- writing ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -117,6 +213,66 @@ def test_a_reader_never_sees_half_a_file(tmp_path: Path) -> None:
         writer.join()
     assert seen | {target.read_text()} <= contents
     assert list(tmp_path.iterdir()) == [target]
+
+
+# --- what is not finished --------------------------------------------------------------------
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from replication.files import scratch_folder
+with scratch_folder(Path(sys.argv[1]) if sys.argv[1:] else None) as folder:
+    (folder / "half").touch()
+    print(folder, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_what_a_killed_process_left_is_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hidden: bool
+) -> None:
+    """The next process removes it, and nothing of a process that lives, or of another machine."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    parent = tmp_path if hidden else None
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, *[str(tmp_path)] * hidden],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    left = Path(process.stdout.readline().strip())
+    assert left.parent == tmp_path
+    elsewhere = left.with_name(left.name.replace("-", "-other", 1))
+    others = [elsewhere, tmp_path / "replicate-mine", tmp_path / ".draft-mine"]
+    for other in others:
+        shutil.copytree(left, other)
+    with scratch_folder(parent) as folder:
+        assert {*tmp_path.iterdir()} == {folder, left, *others}
+        assert len(folder.name) == len(left.name)
+        process.send_signal(signal.SIGKILL)
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # it stays as a zombie
+        with scratch_folder(parent) as second:
+            assert {*tmp_path.iterdir()} == {folder, second, *others}
+    assert {*tmp_path.iterdir()} == {*others}
+    process.communicate()
+
+
+def test_a_write_removes_the_drafts_of_killed_ones(tmp_path: Path) -> None:
+    """What a process left that was killed while it wrote goes with the next file there."""
+    command = [sys.executable, "-c", KILLED, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.kill()
+    assert len(list(tmp_path.iterdir())) == 1
+    target = write_file(tmp_path / "file", "x")
+    assert list(tmp_path.iterdir()) == [target]
+
+
+# --- places ----------------------------------------------------------------------------------
 
 
 def test_paths_are_shown_from_the_project_on(

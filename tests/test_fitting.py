@@ -11,6 +11,7 @@ from replication.fitting import FitError
 from replication.trials.condition import Condition
 from replication.trials.run import run_trials
 from replication.trials.store import Store
+from tests.conftest import Spoil
 
 FEW = Params.of(incorrect="all", episodes=300, horizon=50)
 
@@ -73,6 +74,13 @@ def test_other_files_are_refused_in_one_line(text: str, tmp_path: Path) -> None:
     with pytest.raises(FitError, match=r"broken\.json") as caught:
         Fit.load(path)
     assert "\n" not in str(caught.value)
+
+
+def test_whatever_is_in_the_place_of_a_fit(tmp_path: Path, spoil: Spoil) -> None:
+    """A pipe, a device, a folder, a huge file and JSON that is none are refused in one line."""
+    spoil(tmp_path / "fit.json")
+    with pytest.raises(FitError, match=r"fit\.json: is [^\n]+$"):
+        Fit.load(tmp_path / "fit.json")
 
 
 def test_truncated_fit_is_refused(fitted: Fit, tmp_path: Path) -> None:

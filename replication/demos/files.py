@@ -11,10 +11,10 @@ from typing import Any
 from replication.demos.checks import DemoError, DemoWarning, action_numbers, replay
 from replication.demos.model import Demo, Demos, state_action_pairs
 from replication.demos.schema import FORMAT, VERSION, CorrectFields, IncorrectFields, read_fields
-from replication.demos.strict_json import layout, read_content, reason
+from replication.demos.strict_json import layout, read_content
 from replication.envs.environment import Environment
 from replication.errors import compact, show
-from replication.files import write_file
+from replication.files import printable, reason, write_file
 
 
 def load_demos(path: str | os.PathLike[str]) -> Demos:
@@ -33,13 +33,13 @@ def load_demos(path: str | os.PathLike[str]) -> Demos:
     """
     demos = _read(path)
     for warning in _warnings(demos):
-        warnings.warn(f"{_file(path)}: {warning}", DemoWarning, stacklevel=2)
+        warnings.warn(f"{printable(path)}: {warning}", DemoWarning, stacklevel=2)
     return demos
 
 
 def check_demos(path: str | os.PathLike[str]) -> list[str]:
     """Check a demonstration file; returns its warnings, raises `DemoError` like `load_demos`."""
-    return [f"{_file(path)}: {warning}" for warning in _warnings(_read(path))]
+    return [f"{printable(path)}: {warning}" for warning in _warnings(_read(path))]
 
 
 def parse_demos(content: bytes) -> Demos:
@@ -147,9 +147,4 @@ def _naming(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except DemoError as error:
-        raise DemoError(f"{_file(path)}: {error}") from None
-
-
-def _file(path: str | os.PathLike[str]) -> str:
-    text = os.fsdecode(path)
-    return text if text.isprintable() else repr(text)
+        raise DemoError(f"{printable(path)}: {error}") from None

@@ -5,35 +5,29 @@ from __future__ import annotations
 import json
 import math
 import os
-import stat
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 from replication.demos.checks import DemoError
 from replication.errors import clip, compact, show
+from replication.files import FileError, read_file
 
 MAX_BYTES = 10_000_000
 MAX_FIELDS = 50
 
 
 def read_content(path: str | os.PathLike[str]) -> bytes:
-    """Return the bytes of a regular file, at most one more than :func:`read_json` takes.
+    """Return the bytes of a file that :func:`read_json` may take.
 
     Raises
     ------
     DemoError
-        If it is missing, not a regular file or unreadable.
+        If it is missing, not a regular file, unreadable or too large.
     """
     try:
-        if not stat.S_ISREG(Path(path).stat().st_mode):
-            raise DemoError("is not a regular file; give the path of a JSON file")
-        with Path(path).open("rb") as file:
-            return file.read(MAX_BYTES + 1)
-    except DemoError:
-        raise
-    except (OSError, ValueError) as error:
-        raise DemoError(f"cannot be read ({reason(error)})") from None
+        return read_file(path, MAX_BYTES)
+    except FileError as error:
+        raise DemoError(error.reason) from None
 
 
 def read_json(content: bytes) -> Any:
@@ -84,12 +78,6 @@ def layout(value: Any, *, rows: bool = False, indent: str = "\n") -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(compact, value)) + "]"
     return compact(value)
-
-
-def reason(error: Exception) -> str:
-    """Return why a file cannot be read or written."""
-    text = getattr(error, "strerror", None) or str(error)
-    return text[:1].lower() + text[1:]
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from replication.errors import UserError, unknown
 from replication.evidence.statistics import CONFIDENCE
+from replication.files import read_text
 from replication.irl import METHODS
 from replication.paper.published import Published
 
@@ -233,7 +234,7 @@ class Claims(Strict):
 @cache
 def load_claims() -> Claims:
     """Return the claims of the package."""
-    return parse_claims(FILE.read_text(encoding="utf-8"))
+    return parse_claims(read_text(FILE))
 
 
 def parse_claims(text: str) -> Claims:
@@ -266,7 +267,7 @@ def parse_claims(text: str) -> Claims:
 
 def criteria_hash() -> str:
     """Return the hash of the frozen file, which is written beside every verdict."""
-    return canonical_hash(FILE.read_text(encoding="utf-8"))
+    return canonical_hash(read_text(FILE))
 
 
 def canonical_hash(text: str) -> str:

@@ -22,7 +22,7 @@ from replication.evidence import sweep
 from replication.evidence.calibration import grid_conditions
 from replication.evidence.experiments import EXPERIMENTS, condition_of
 from replication.evidence.tables import csv_text
-from replication.files import resolve
+from replication.files import read_file, resolve
 from replication.irl import Trial
 from replication.irl.agent import Agent
 from replication.trials.compute import compute, trial_key
@@ -167,7 +167,7 @@ def _read(path: Path) -> pd.DataFrame:
     OSError, ValueError
         If it cannot be read, or has no trials.
     """
-    trials = pd.read_csv(path, dtype=str, keep_default_na=False)
+    trials = pd.read_csv(io.BytesIO(read_file(path)), dtype=str, keep_default_na=False)
     if missing := {"task", "method", "reading", "set", "trial", "seed"} - {*trials.columns}:
         raise ValueError(f"it has no column {min(missing)}")
     if trials.empty:

@@ -20,7 +20,7 @@ from replication.demos.checks import DemoError
 from replication.demos.files import load_demos
 from replication.evidence.claims import ClaimError, Strict, load_claims
 from replication.evidence.experiments import EXPERIMENTS
-from replication.files import resolve
+from replication.files import read_text, resolve
 from replication.paper.register import ChoiceError, Value, load_choices
 
 FILE = Path(__file__).with_name("specifications.toml")
@@ -124,7 +124,7 @@ def sort_key(value: object) -> tuple[bool, float, str]:
 @cache
 def load_specifications() -> Declared:
     """Return the specifications of the package."""
-    return parse_specifications(FILE.read_text(encoding="utf-8"))
+    return parse_specifications(read_text(FILE))
 
 
 def check_declared() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from replication.demos.model import Demos
 from replication.envs.maze import Maze
 from replication.evidence.experiments import Key, under
 from replication.evidence.statistics import Comparison, compare, holm, mean_prediction, summarise
-from replication.files import write_file
+from replication.files import read_file, write_file
 from replication.irl import METHODS, Trial
 from replication.irl.expectations import visited
 from replication.paper.published import Published
@@ -218,7 +219,7 @@ def csv_text(table: pd.DataFrame) -> str:
 
 def read_table(path: Path) -> pd.DataFrame:
     """Read a table that was written as CSV; what is empty is NaN in columns of numbers only."""
-    table = pd.read_csv(path, keep_default_na=False, na_values=[""])
+    table = pd.read_csv(BytesIO(read_file(path)), keep_default_na=False, na_values=[""])
     for name in table:
         if table[name].dtype.kind not in "fiub" or name == "reading":
             table[name] = table[name].astype(object).where(table[name].notna(), "")

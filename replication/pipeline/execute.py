@@ -10,7 +10,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -20,7 +19,7 @@ from typing import Any
 import psutil
 
 from replication.errors import UserError
-from replication.files import write_file
+from replication.files import scratch_folder, write_file
 from replication.pipeline.notebook import Notebook, RunError, first_line, refuse
 from replication.pipeline.rendering import as_text, clean, link_players, read_executed
 from replication.progress import EVENTS, Display
@@ -68,8 +67,8 @@ def execute(
     RunError
         If a cell failed, took too long or killed its kernel.
     """
-    with tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as name:
-        scratch = Path(name).resolve()
+    with scratch_folder() as folder:
+        scratch = folder.resolve()
         draft = scratch / f"{notebook.name}.ipynb"
         given = {**values, "out": str(stage)}
         options = {

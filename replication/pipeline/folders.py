@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from replication import files
+from replication.files import open_lock
 from replication.pipeline.notebook import refuse
 from replication.pipeline.publish import recover
 
@@ -68,7 +69,7 @@ def exclusive(folder: Path, echo: Callable[[str], object]) -> Iterator[bool]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("w")
+        lock = open_lock(folder / LOCK)
     except OSError as error:
         refuse(folder, f"cannot be used as a folder: {(error.strerror or str(error)).lower()}")
     with lock:

@@ -6,13 +6,12 @@ tables and data files has a row: what readers call it, which leads to it, and it
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from replication.files import write_file
+from replication.files import FileError, read_json, read_text, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.manifest import published_folders, read_runs
 
@@ -40,8 +39,10 @@ def write_index(out: Path) -> None:
 
 def index_texts(out: Path) -> tuple[str, str]:
     """Return the page as it is, or an empty text, and as it should be."""
-    path = out / INDEX
-    before = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    try:
+        before = read_text(out / INDEX)
+    except FileError:  # whatever is there is replaced
+        before = ""
     sections = [_section(out, *item, before) for item in published_folders(out).items()]
     return before, "\n".join([HEAD, *sections])
 
@@ -49,7 +50,7 @@ def index_texts(out: Path) -> tuple[str, str]:
 def shown_outputs(folder: Path) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the metadata of what a published notebook displays, and the heading above it."""
     heading = ""
-    for cell in json.loads((folder / EXECUTED).read_text(encoding="utf-8"))["cells"]:
+    for cell in read_json(folder / EXECUTED)["cells"]:
         if cell["cell_type"] == "markdown":
             headings = re.findall(r"^#+ +(.+)$", "".join(cell["source"]), re.MULTILINE)
             heading = headings[-1] if headings else heading
@@ -86,7 +87,7 @@ def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str)
         stems.setdefault(name.partition(".")[0], []).append(name)
     try:
         shown = {entry["name"]: heading for entry, heading in shown_outputs(out / notebook)}
-    except (OSError, ValueError, KeyError):  # damaged, which its status reports
+    except (ValueError, KeyError, TypeError, AttributeError):  # damaged, which its status reports
         shown = {}
     parameters = manifest["inputs"]["parameters"]
     facts = [

@@ -13,11 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from replication import files
+from replication.files import FileError, parse_json, read_file
 from replication.pipeline.notebook import Notebook, NotebookError
 from replication.source import bare_source, imports_of, module_hashes
 
 NEUTRAL = frozenset({"jobs", "store", "out", "results"})
 """Parameters that leave every result as it is."""
+
+LARGEST_JSON = 10_000_000
+"""Bytes of a file of demonstrations; the reader refuses one that is larger, whatever it says."""
 
 Inputs = dict[str, Any]
 
@@ -35,7 +39,7 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any], results: Path) -> I
     Raises
     ------
     NotebookError
-        If a file that the notebook reads does not exist.
+        If a file that the notebook reads cannot be read.
     """
     cells = [  # the parameters cell keeps its place among them
         "" if at == notebook.at else cell.source
@@ -53,9 +57,8 @@ def inputs_of(notebook: Notebook, values: Mapping[str, Any], results: Path) -> I
     for name, file in sorted(read.items()):
         try:
             data[name] = data_hash(file)
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise NotebookError(f"{file}: cannot be read by {notebook.name}: {reason}") from None
+        except FileError as error:
+            raise NotebookError(f"{error}; {notebook.name} reads it") from None
     return {
         "cells": text_hash(json.dumps([bare_source(cell) for cell in cells])),
         "parameters": {k: v for k, v in sorted(parameters.items()) if k not in NEUTRAL},
@@ -83,7 +86,7 @@ def changes(before: Inputs, now: Inputs) -> list[str]:
 
 def file_hash(path: Path) -> str:
     """Return the SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_file(path)).hexdigest()
 
 
 def text_hash(text: str) -> str:
@@ -92,15 +95,18 @@ def text_hash(text: str) -> str:
 
 
 def data_hash(path: Path) -> str:
-    """Return the hash of what a data file says: of TOML and JSON without their layout."""
-    content = path.read_bytes()
+    """Return the hash of what a data file says: of TOML and JSON without their layout.
+
+    What a strict reader refuses may look like something that it takes, and has a hash of its own.
+    """
+    content = read_file(path)
     try:
         if path.suffix == ".toml":
             document = tomllib.loads(content.decode())
             return text_hash(json.dumps(document, sort_keys=True, default=str))
-        if path.suffix == ".json":
-            return text_hash(json.dumps(json.loads(content), sort_keys=True))
-    except ValueError:
+        if path.suffix == ".json" and len(content) <= LARGEST_JSON:
+            return text_hash(json.dumps(parse_json(content), sort_keys=True))
+    except (ValueError, RecursionError):
         pass  # whoever reads it reports what is wrong
     return hashlib.sha256(content).hexdigest()
 

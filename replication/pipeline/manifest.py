@@ -20,7 +20,7 @@ from typing import Any
 import joblib
 
 from replication import files
-from replication.files import write_file
+from replication.files import read_json, write_file
 from replication.pipeline.declaration import EXECUTED, MANIFEST
 from replication.pipeline.inputs import Inputs, changes, file_hash, text_hash
 from replication.pipeline.notebook import INJECTED
@@ -61,7 +61,7 @@ def state_of(folder: Path, inputs: Inputs) -> State:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Return the manifest of a notebook's folder; empty if there is none that can be used."""
     try:
-        document = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        document = read_json(folder / MANIFEST)
         inputs = [document["inputs"][part] for part in ("parameters", "data", "source")]
         known = (document["format"], document["version"]) == (FORMAT, VERSION)
         usable = known and all(isinstance(part, dict) for part in [document["outputs"], *inputs])
@@ -103,10 +103,10 @@ def output_hash(path: Path) -> str:
     These are the outputs of its code cells and the injected parameters. Text, code and the version
     of Python are not among them: text is brought up to date without a run.
     """
-    if path.name != EXECUTED:
-        return file_hash(path)
     try:
-        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        if path.name != EXECUTED:
+            return file_hash(path)
+        cells = read_json(path)["cells"]
         given = [
             [
                 "".join(cell["source"]) if INJECTED in cell["metadata"].get("tags", ()) else "",
@@ -117,7 +117,7 @@ def output_hash(path: Path) -> str:
             if cell["cell_type"] == "code"
         ]
     except (ValueError, KeyError, TypeError):
-        return "no notebook"
+        return "unreadable"
     return text_hash(json.dumps(given, sort_keys=True))
 
 
@@ -150,7 +150,7 @@ def read_runs(out: Path) -> dict[str, Any]:
     What cannot be read counts as not recorded.
     """
     try:
-        runs = dict(json.loads((out / RUNS).read_text(encoding="utf-8")))
+        runs = dict(read_json(out / RUNS))
     except (OSError, ValueError, TypeError):
         return {}
     return {name: entry for name, entry in runs.items() if _is_run(entry)}

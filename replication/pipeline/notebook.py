@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, NoReturn
 from pydantic import ValidationError
 
 from replication.errors import UserError, unknown
+from replication.files import FileError, parse_json, read_text
 from replication.pipeline.declaration import EXECUTED, Declaration
 
 INJECTED = "injected-parameters"
@@ -145,10 +146,10 @@ def read_notebook(path: Path) -> Notebook:
         cell has a line other than `name = literal`, or if the declarations are not usable.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         metadata, cells = _parsed(text)
-    except OSError as error:
-        refuse(path, f"cannot be read: {(error.strerror or str(error)).lower()}")
+    except FileError as error:
+        raise NotebookError(str(error)) from None
     except Exception as error:  # whatever the contents make the reader raise
         refuse(path, f"is not a valid notebook: {first_line(error)}")
     tagged = [
@@ -172,7 +173,7 @@ def read_notebook(path: Path) -> Notebook:
 
 def _parsed(text: str) -> tuple[dict[str, Any], tuple[Cell, ...]]:
     """Return the metadata and the cells of a notebook's file, which is plain JSON."""
-    document = json.loads(text)
+    document = parse_json(text)
     if document["nbformat"] != 4:
         raise ValueError(f"its format is {document['nbformat']}, not 4")
     cells = [

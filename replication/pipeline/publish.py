@@ -8,28 +8,26 @@ a reader sees the old outputs, the new ones, or for a moment none, but never a m
 from __future__ import annotations
 
 import shutil
-import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from replication.files import LARGEST, remove_left, scratch_folder
 from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.manifest import hashes, output_hash, read_manifest
 from replication.pipeline.notebook import Notebook, RunError, refuse
 
-DRAFT, ASIDE = ".draft-", ".aside-"
-"""What the names of folders begin with that are half-written, or renamed aside."""
+ASIDE = ".aside-"
+"""What the name of a folder begins with that was renamed aside."""
 
 
 @contextmanager
 def draft_folder(out: Path) -> Iterator[Path]:
     """Make a folder in `out` for what is not published yet; unless it is, it is removed."""
-    draft = out / f"{DRAFT}{uuid.uuid4().hex}"
-    draft.mkdir()
-    try:
+    with scratch_folder(out) as scratch:
+        draft = scratch / "draft"  # unlike its parent, others may enter it
+        draft.mkdir()
         yield draft
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def swap(draft: Path, target: Path) -> None:
@@ -53,15 +51,15 @@ def swap(draft: Path, target: Path) -> None:
 
 
 def recover(out: Path) -> None:
-    """Put back or remove what a killed process left in a folder."""
+    """Put back or remove what killed processes left in a folder, and in that of the system."""
     for aside in out.glob(f"{ASIDE}*"):
         target = out / aside.name.removeprefix(ASIDE)
         if target.exists():
             shutil.rmtree(aside)
         else:
             aside.rename(target)
-    for draft in out.glob(f"{DRAFT}*"):
-        shutil.rmtree(draft)
+    for folder in (None, out, *out.glob("[!.]*/")):
+        remove_left(folder)
 
 
 def check_target(notebook: Notebook, target: Path) -> None:
@@ -92,6 +90,9 @@ def check_outputs(notebook: Notebook, stage: Path) -> None:
     declared = notebook.declared.outputs
     if missing := [name for name in declared if not (stage / name).is_file()]:
         raise RunError(f"{notebook.path}: declared but not written: {', '.join(missing)}")
+    if large := [name for name in declared if (stage / name).stat().st_size > LARGEST]:
+        most = f"{LARGEST // 1_000_000} MB"
+        raise RunError(f"{notebook.path}: written, but larger than {most}: {', '.join(large)}")
     if extra := sorted({path.name for path in stage.iterdir()} - set(declared)):
         raise RunError(f"{notebook.path}: written but not declared: {', '.join(extra)}")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from replication.errors import unknown
-from replication.files import write_file
+from replication.files import read_file, read_json, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive
 from replication.pipeline.index import shown_outputs, write_index
@@ -80,7 +80,7 @@ def _redraw_folder(
     new = {
         name: content
         for name, content in drawn.items()
-        if not (folder / name).is_file() or (folder / name).read_bytes() != content
+        if not (folder / name).is_file() or read_file(folder / name) != content
     }
     if not new:
         return []
@@ -103,7 +103,7 @@ def _check_whole(folder: Path, manifest: Mapping[str, Any], file: str) -> None:
 
 def _embedded(notebook: Path, drawn: Mapping[str, bytes]) -> str:
     """Return the text of a notebook with the new pictures in it."""
-    document = json.loads(notebook.read_text(encoding="utf-8"))
+    document = read_json(notebook)
     for output in (output for cell in document["cells"] for output in cell.get("outputs", [])):
         name = f"{output.get('metadata', {}).get('replication', {}).get('name')}.png"
         if name in drawn and "image/png" in output["data"]:

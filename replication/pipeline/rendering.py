@@ -10,6 +10,7 @@ from typing import Any
 import nbformat
 
 from replication import files
+from replication.files import read_text
 from replication.pipeline.inputs import NEUTRAL
 from replication.pipeline.notebook import INJECTED, Notebook
 
@@ -22,7 +23,7 @@ def read_executed(file: Path, folders: Mapping[Path, Path]) -> Any:
 
     `folders` maps folders whose paths may be in it to those that it shall name instead.
     """
-    text = file.read_text(encoding="utf-8")
+    text = read_text(file)
     for folder, other in folders.items():
         text = text.replace(json.dumps(str(folder))[1:-1], json.dumps(files.shown_as(other))[1:-1])
     node = nbformat.reads(text, as_version=4)
@@ -63,7 +64,7 @@ def rendered(notebook: Notebook, executed: Path) -> str:
 
     The code may differ in comments and layout only.
     """
-    node = nbformat.read(executed, as_version=4)
+    node = nbformat.reads(read_text(executed), as_version=4)
     code = [cell for cell in node.cells if cell.cell_type == "code"]
     cells = []
     for at, cell in enumerate(notebook.load().cells):

@@ -20,7 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from replication import files
-from replication.files import check_writable, write_file
+from replication.files import check_writable, read_text, scratch_folder, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import (
     EDITED,
@@ -210,10 +210,9 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
     failed = failed_notebook(run.name, run.out)
     with (
         draft_folder(run.out) as stage,
-        # A kernel that is being killed may still write there.
-        tempfile.TemporaryDirectory(prefix="replicate-", ignore_cleanup_errors=True) as scratch,
+        scratch_folder() as scratch,
     ):
-        store = Path(scratch) / "trials.sqlite" if force else store_of(run)
+        store = scratch / "trials.sqlite" if force else store_of(run)
         try:
             produce(run, stage, store=store, failed=failed, **options)
         except RunError:
@@ -297,7 +296,7 @@ def _unpublished(run: Run, error: OSError) -> RunError:
 def render_text(run: Run) -> None:
     """Bring the text of a published notebook up to date; nothing is executed."""
     published = run.folder / EXECUTED
-    before = published.read_text(encoding="utf-8")
+    before = read_text(published)
     if run.notebook.shows(before):
         return
     from replication.pipeline.rendering import rendered  # loads nbformat

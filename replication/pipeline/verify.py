@@ -17,6 +17,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from replication.errors import UserError
+from replication.files import read_file, read_text
 from replication.pipeline.declaration import MANIFEST, TRIALS
 from replication.pipeline.folders import LOCK
 from replication.pipeline.index import INDEX, index_texts
@@ -103,9 +104,7 @@ def verify_outputs(
         yield f"{run.name} cannot be made again: {error}"
         return
     names = [*run.notebook.published, MANIFEST]
-    wrong = [
-        name for name in names if (stage / name).read_bytes() != (run.folder / name).read_bytes()
-    ]
+    wrong = [name for name in names if read_file(stage / name) != read_file(run.folder / name)]
     for name in wrong:
         yield f"{run.name}/{name} has other bytes than its notebook gives"
     if not wrong:
@@ -115,7 +114,7 @@ def verify_outputs(
 
 def verify_packages(lock: Path) -> Iterator[str]:
     """Yield how the installed packages differ from those that are pinned in a lock file."""
-    for line in lock.read_text(encoding="utf-8").splitlines():
+    for line in read_text(lock).splitlines():
         if not re.match(r"[A-Za-z0-9]", line):
             continue
         pin = Requirement(line.split("\\")[0].strip())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from matplotlib.lines import Line2D
 from replication.envs.environment import Environment
 from replication.envs.soccer.field import as_soccer
 from replication.envs.soccer.replay import replay
-from replication.files import write_file
+from replication.files import read_file, scratch_folder, write_file
 from replication.irl import Trial
 from replication.report.moving import Player, player
 from replication.report.pitch import BLUE, PINK, YELLOW, Movers, draw_pitch, obstacle_columns
@@ -43,10 +42,10 @@ class Film:
 
     def save_gif(self, path: Path) -> Path:
         """Write the film as a GIF, whole or not at all."""
-        with tempfile.TemporaryDirectory() as folder, style():
-            draft = Path(folder) / "draft.gif"
+        with scratch_folder() as folder, style():
+            draft = folder / "draft.gif"
             self.animation.save(draft, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=DPI)
-            return write_file(path, draft.read_bytes())
+            return write_file(path, read_file(draft))
 
 
 def turning_points(trial: Trial) -> dict[str, Iterable[int]]:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from replication.errors import UserError
 from replication.evidence.tables import read_table, write_csv
-from replication.files import write_file
+from replication.files import read_file, write_file
 from replication.progress import GIVEN
 from replication.report.moving import Player
 from replication.report.picture import Picture
@@ -57,7 +57,7 @@ class Outputs:
         """Write `name`.csv, and draw it into `name`.png and `name`.svg; return it for display."""
         numbers = read_table(write_csv(picture.numbers, self.folder / f"{name}.csv"))
         png, _ = save_figure(picture.draw(numbers), self.folder / name, ("png", "svg"))
-        data = {"image/png": png.read_bytes(), "text/plain": picture.words}
+        data = {"image/png": read_file(png), "text/plain": picture.words}
         return Shown(data, kind="figure", name=name, alt=picture.words, code=picture.code)
 
     def table(self, table: pd.DataFrame, name: str, *, readable: pd.DataFrame) -> Shown:

@@ -14,7 +14,7 @@ from pathlib import Path
 from replication import files
 from replication.errors import UserError
 from replication.evidence.tables import read_table
-from replication.files import write_file
+from replication.files import read_file, read_text, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
 from replication.pipeline.manifest import FRESH, read_runs
@@ -104,7 +104,7 @@ def _stage(staged: Mapping[str, bytes], work: Path) -> None:
             shutil.rmtree(work / part, ignore_errors=True)
     for name, content in staged.items():
         target = source / name
-        if not target.exists() or target.read_bytes() != content:
+        if not target.exists() or read_file(target) != content:
             write_file(target, content)
 
 
@@ -120,10 +120,10 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
         yield name, text.encode()
     for pattern in PLACES:
         for path in sorted(files.PROJECT.glob(pattern)):
-            yield path.relative_to(files.PROJECT).as_posix(), path.read_bytes()
+            yield path.relative_to(files.PROJECT).as_posix(), read_file(path)
     for path in sorted(out.glob("[!.]*/[!.]*")):
         if path.suffix != ".ipynb":
-            yield f"figures/{path.relative_to(out).as_posix()}", path.read_bytes()
+            yield f"figures/{path.relative_to(out).as_posix()}", read_file(path)
     recorded = read_runs(out)
     for run in runs:
         done = recorded.get(run.name, {})
@@ -131,15 +131,14 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
         origin = Origin(run.name, parameters, done.get("seconds"), done.get("machine", ""))
         shown = page(run.folder / EXECUTED, origin)
         yield f"notebooks/{run.name}.ipynb", json.dumps(shown, indent=1).encode()
-        yield f"source/{run.name}.ipynb", run.notebook.path.read_bytes()
+        yield f"source/{run.name}.ipynb", read_file(run.notebook.path)
 
 
 def _prose(generated: Mapping[str, str]) -> dict[str, str]:
     """Return the pages of docs/, each mark `<!-- site: name -->` replaced by what is generated."""
     docs = files.PROJECT / "docs"
     pages = {
-        path.relative_to(docs).as_posix(): path.read_text(encoding="utf-8")
-        for path in sorted(docs.rglob("*.md"))
+        path.relative_to(docs).as_posix(): read_text(path) for path in sorted(docs.rglob("*.md"))
     }
     pages |= {name: text for name, text in generated.items() if name.endswith(".md")}
     pages = {
@@ -161,7 +160,7 @@ def _generated(out: Path) -> dict[str, str]:
         "verdicts": overview.verdicts(judged, holds),
         "published": overview.published(judged),
         "choices": overview.choices(read_table(out / "sensitivity" / "shares.csv")),
-        "citation": overview.citation((files.PROJECT / "CITATION.cff").read_text("utf-8")),
+        "citation": overview.citation(read_text(files.PROJECT / "CITATION.cff")),
     }
 
 
@@ -170,7 +169,7 @@ def _write(work: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-N", "-W", "--keep-going"]
     command += ["-c", str(files.PROJECT / "docs"), "-d", str(work / "doctrees")]
     outline, known = _outline(work / "source"), work / "outline"
-    if not known.exists() or known.read_text(encoding="utf-8") != outline:
+    if not known.exists() or read_text(known) != outline:
         command += ["-a", "-E"]  # every page shows it at its side, and may link to new pages
     known.unlink(missing_ok=True)
     command += [str(work / "source"), str(work / "html")]
@@ -184,7 +183,7 @@ def _write(work: Path) -> None:
 def _outline(source: Path) -> str:
     """Return the titles of the pages and their order."""
     part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
-    pages = (path.read_text(encoding="utf-8") for path in sorted(source.glob("*.md")))
+    pages = (read_text(path) for path in sorted(source.glob("*.md")))
     return "\n".join(title for text in pages for title in part.findall(text))
 
 

@@ -6,13 +6,13 @@ it displayed it: kind, name, words and code (see :mod:`replication.report.output
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from replication.files import read_json
 from replication.paper.register import load_choices
 
 SHOWN = ("seed", "trials", "set_trials", "choices")
@@ -67,7 +67,7 @@ def _download(text: str, file: str) -> str:
 
 def page(published: Path, origin: Origin) -> dict[str, Any]:
     """Return the page of a published notebook, a notebook as JSON; its files lie beside it."""
-    node: dict[str, Any] = json.loads(published.read_text(encoding="utf-8"))
+    node: dict[str, Any] = read_json(published)
     named: set[str] = set()
     node["cells"] = [
         part for cell in node["cells"] for part in _parts(cell, published.parent, origin, named)

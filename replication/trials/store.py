@@ -11,6 +11,7 @@ and the sensitivity analysis reads tens of thousands of trials.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import math
 import sqlite3
@@ -24,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.errors import UserError
+from replication.files import open_lock, printable
 from replication.irl import Snapshots, Trial
 from replication.irl.agent import Episode
 
@@ -50,20 +52,27 @@ class Store:
 
     Raises
     ------
+    UserError
+        If there is something else in its place, or SQLite cannot use the file.
     OSError
-        If the file can be neither used nor made.
+        If its folder can be neither used nor made.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
+        if self.path.exists() and not self.path.is_file():
+            raise UserError(f"{printable(path)}: the store cannot be used: it is no regular file")
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            self._open()
-        except sqlite3.OperationalError as error:
-            raise OSError(f"{self.path}: the store cannot be used: {error}") from None
-        except sqlite3.DatabaseError as error:
-            self._set_aside(str(error))
-            self._open()
+        # SQLite does not wait for whoever is making the file, and a damaged one is set aside once
+        with open_lock(self.path.with_name(f"{self.path.name}-lock")) as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            try:
+                self._open()
+            except sqlite3.OperationalError as error:
+                raise UserError(f"{printable(path)}: the store cannot be used: {error}") from None
+            except sqlite3.DatabaseError as error:
+                self._set_aside(str(error))
+                self._open()
 
     def __contains__(self, key: str) -> bool:
         return bool(self.known([key]))

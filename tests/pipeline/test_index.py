@@ -12,6 +12,7 @@ from replication.pipeline import execute as execution
 from replication.pipeline.index import INDEX, shown_outputs, write_index
 from replication.pipeline.manifest import RUNS
 from replication.pipeline.run import run_notebooks
+from tests.conftest import Spoil
 
 
 @pytest.fixture
@@ -72,6 +73,16 @@ def test_a_page_that_is_right_is_not_written(out: Path) -> None:
     before = (out / INDEX).stat().st_mtime_ns
     write_index(out)
     assert (out / INDEX).stat().st_mtime_ns == before
+
+
+def test_whatever_is_in_the_place_of_the_page_is_replaced(out: Path, spoil: Spoil) -> None:
+    """A page that cannot be read is written anew, also where a notebook cannot be read, either."""
+    spoil(out / INDEX)
+    if (out / INDEX).is_dir():
+        (out / INDEX).rmdir()
+    spoil(out / "toy" / "notebook.ipynb")
+    write_index(out)
+    assert "| [Fig. 5](toy/fig05.png) |" in (out / INDEX).read_text()
 
 
 def test_what_is_shown_comes_with_its_heading(out: Path) -> None:

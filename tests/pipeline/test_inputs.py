@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,10 +9,12 @@ from typing import Any
 
 import pytest
 
-from replication import files
+from replication import files, load_demos
+from replication.demos.checks import DemoError
 from replication.pipeline import inputs as inputs_module
 from replication.pipeline.inputs import Inputs, changes
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook
+from tests.conftest import Spoil
 from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\ndemos = "demos.json"\njobs = 1\nstore = "s"\nout = "build"'
@@ -180,8 +183,45 @@ def test_any_file_that_a_parameter_names_counts(write: Write, project: Path) -> 
 def test_missing_data_is_the_users_mistake(write: Write, project: Path) -> None:
     """A data file that does not exist is named before anything runs."""
     (project / "demos.json").unlink()
-    with pytest.raises(NotebookError, match=r"demos\.json: cannot be read by toy: no such file"):
+    with pytest.raises(NotebookError, match=r"demos\.json: cannot be read \(no .*; toy reads"):
         inputs_of(write(), {})
+
+
+def test_data_of_any_kind_is_hashed_or_refused(write: Write, project: Path, spoil: Spoil) -> None:
+    """What cannot be read is named; what its reader will refuse has the hash of its bytes."""
+    path = project / "demos.json"
+    spoil(path)
+    if path.is_file() and path.stat().st_size < 10**6:
+        due = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert inputs_of(write(), {})["data"]["demos.json"] == due
+    else:
+        with pytest.raises(NotebookError, match=r"demos\.json: is [^\n]+; toy reads it"):
+            inputs_of(write(), {})
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        b'{"a": 2, "a": 1, "b": [2]}',
+        '{"a": 1, "b": [2]}'.encode("utf-16"),
+        b'{"a": 1, "b": [2]}' + b" " * 10_000_000,
+    ],
+)
+def test_what_a_reader_refuses_is_not_taken_for_what_it_accepts(
+    write: Write, project: Path, refused: bytes
+) -> None:
+    """A key that stands there twice, other encodings and sizes leave no file as it was."""
+    before = inputs_of(write(), {})
+    (project / "demos.json").write_bytes(refused)
+    with pytest.raises(DemoError):
+        load_demos(project / "demos.json")
+    assert changes(known(before), inputs_of(write(), {})) == ["demos.json has changed"]
+
+
+def test_toml_that_is_nested_too_deeply_is_hashed(write: Write, project: Path) -> None:
+    """It has the hash of its bytes, as everything that its reader refuses."""
+    (project / "choices.toml").write_text("a = " + "[" * 100_000)
+    assert inputs_of(write(), {})["data"]["choices.toml"]
 
 
 def test_tables_of_needed_notebooks_count(write: Write, project: Path) -> None:

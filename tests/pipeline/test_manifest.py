@@ -16,6 +16,7 @@ from replication.pipeline.manifest import (
     state_of,
     write_manifest,
 )
+from tests.conftest import Spoil
 
 INPUTS: dict[str, Any] = {
     "cells": "0",
@@ -97,6 +98,20 @@ def test_a_manifest_that_cannot_be_used_counts_as_none(folder: Path, content: by
         (folder / MANIFEST).write_bytes(content)
     assert read_manifest(folder) == {}
     assert published_folders(folder.parent) == {}
+
+
+def test_whatever_is_in_the_place_of_a_published_file(folder: Path, spoil: Spoil) -> None:
+    """A manifest and a record of runs that cannot be read count as none, an output as damaged."""
+    known = read_manifest(folder)
+    spoil(folder / "a.csv")
+    assert damaged(folder, known)["a.csv"] in ("changed", "missing")
+    spoil(folder / MANIFEST)
+    assert read_manifest(folder) == {}
+    assert state_of(folder, INPUTS).kind == "stale"
+    spoil(folder / "notebook.ipynb")
+    assert output_hash(folder / "notebook.ipynb") == "unreadable"
+    spoil(folder.parent / manifest.RUNS)
+    assert manifest.read_runs(folder.parent) == {}
 
 
 def test_text_of_a_notebook_is_not_hashed(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from replication.pipeline.notebook import NotebookError, read_notebook
+from tests.conftest import Spoil
 from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nalpha = 0.5\nname = "a"\nchoices = {}\njobs = 1\nseed = 1\nout = "build"'
@@ -108,10 +109,10 @@ def test_a_notebook_must_declare_something(write: Write) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "cannot be read: no such file"),
+        (None, "cannot be read (no such file"),
         (b"no JSON", "is not a valid notebook"),
         (b"[]", "is not a valid notebook"),
-        (b"\xff\xfe", "is not a valid notebook"),
+        (b"\xff\xfe", "is not UTF-8 text (byte 1)"),
         (b'{"nbformat": 4, "nbformat_minor": 5, "cells": 3, "metadata": {}}', "not a valid"),
         (b'{"nbformat": 4, "nbformat_minor": 5, "cells": [], "metadata": {}}', "0 cells have"),
     ],
@@ -127,3 +128,32 @@ def test_file_that_is_no_notebook_is_refused(
         read_notebook(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_whatever_is_in_the_place_of_a_notebook(write: Write, spoil: Spoil) -> None:
+    """A pipe, a device, a folder, a huge file and JSON that is none are refused in one line."""
+    path = write()
+    spoil(path)
+    with pytest.raises(NotebookError, match=r"toy\.ipynb: is [^\n]+$"):
+        read_notebook(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"nbformat": 4,', '"nbformat": 4, "nbformat": 3,', "the field 'nbformat' appears twice"),
+        (
+            '"nbformat": 4,',
+            '"nbformat": 4, "x": ' + "[" * 200 + "]" * 200 + ",",
+            "nested too deeply",
+        ),
+    ],
+)
+def test_json_of_a_notebook_is_read_strictly(
+    write: Write, old: str, new: str, message: str
+) -> None:
+    """What other readers may read differently, or not at all, is refused before anything runs."""
+    path = write()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(NotebookError, match=f"is not a valid notebook: .*{message}"):
+        read_notebook(path)

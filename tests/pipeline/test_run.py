@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import re
 import shutil
+import subprocess
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,7 @@ from nbformat.v4 import new_markdown_cell
 
 from replication import source
 from replication.errors import UserError
-from replication.files import write_file
+from replication.files import scratch_folder, write_file
 from replication.pipeline import publish
 from replication.pipeline.manifest import RUNS
 from replication.pipeline.notebook import NotebookError, RunError
@@ -476,11 +479,18 @@ def test_a_module_that_is_edited_during_the_run_is_noticed(
 
 
 def test_outputs_must_be_the_declared_ones(toy: Any, run: Any, begun: list[str]) -> None:
-    """A file too many, or too few, is named."""
+    """A file too many, or too few, or too large for a reader, is named."""
     with pytest.raises(RunError, match=r"toy\.ipynb: written but not declared: c$"):
         run(toy("(folder / 'c').mkdir()\nvalue = 1"))
     with pytest.raises(RunError, match=r"toy\.ipynb: declared but not written: c\.csv, c\.md$"):
         run(toy(tables=["c"]))
+    with pytest.raises(RunError, match=r"toy\.ipynb: written, but larger than .*: c\.txt$"):
+        run(
+            toy(
+                "(folder / 'c.txt').touch()\nos.truncate(folder / 'c.txt', 10**9)\nvalue = 1",
+                data=["a.txt", "b.txt", "c.txt"],
+            )
+        )
 
 
 @pytest.mark.parametrize("step", ["aside", "in"])
@@ -497,7 +507,7 @@ def test_publishing_is_all_or_nothing(
     rename = Path.rename
 
     def fail(path: Path, target: Path) -> Path:
-        if path.name.startswith(".draft-") or (step == "aside" and path.name == "toy"):
+        if path.parent.name.startswith(".draft-") or (step == "aside" and path.name == "toy"):
             raise OSError(errno.ENOSPC, "No space left on device")
         return rename(path, target)
 
@@ -509,14 +519,23 @@ def test_publishing_is_all_or_nothing(
     assert damage(project / "figures") == []
 
 
+def leave_behind(parent: Path | None) -> None:
+    """Leave what a process leaves that is killed."""
+    number = subprocess.Popen(["true"])
+    number.wait()
+    with scratch_folder(parent) as folder:
+        dead = folder.name.replace(f"{os.getpid():07d}", f"{number.pid:07d}")
+        shutil.copytree(folder, folder.with_name(dead))
+
+
 def test_what_killed_runs_left_is_put_right(
     toy: Any, run: Any, project: Path, begun: list[str]
 ) -> None:
     """Drafts go, a folder that was renamed aside comes back, and one that was replaced goes."""
     figures = project / "figures"
     run(toy())
-    (figures / f"{publish.DRAFT}killed").mkdir()
-    (figures / f"{publish.DRAFT}killed" / "half").touch()
+    for parent in (None, figures, figures / "toy"):
+        leave_behind(parent)
     shutil.copytree(figures / "toy", figures / f"{publish.ASIDE}toy")
     run(toy())
     (figures / "toy").rename(figures / f"{publish.ASIDE}toy")
@@ -537,7 +556,9 @@ def test_runs_at_the_same_time_leave_whole_outputs(
     toy: Any, project: Path, begun: list[str]
 ) -> None:
     """Runs of different parameters take turns: the outputs are all of one of them."""
-    path = toy("import time; time.sleep(0.3); value = seed")
+    gate = project / "gate"
+    gate.touch()
+    path = toy(f"import time\nwhile Path({str(gate)!r}).exists(): time.sleep(0.01)\nvalue = seed")
     out, lines = project / "build" / "custom", list[str]()
     options: dict[str, Any] = {"profile": "paper", "out": out}
     threads = [
@@ -545,13 +566,17 @@ def test_runs_at_the_same_time_leave_whole_outputs(
             target=run_notebooks,
             args=([path],),
             kwargs=options | {"seed": seed, "echo": lines.append},
+            daemon=True,  # where this test fails, they may wait for ever
         )
         for seed in (1, 2, 3)
     ]
     for thread in threads:
         thread.start()
+    while len(lines) < 3 and all(thread.is_alive() for thread in threads):  # one begins, two wait
+        time.sleep(0.01)
+    gate.unlink()
     for thread in threads:
-        thread.join(timeout=60)
+        thread.join()
     assert begun == ["toy"] * 3
     assert sum("waiting until it ends" in line for line in lines) == 2
     texts = {(out / "toy" / f"{name}.txt").read_text() for name in "ab"}

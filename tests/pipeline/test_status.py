@@ -248,5 +248,5 @@ def test_cleaning_waits_for_a_run(project: Path, left: Path) -> None:
         time.sleep(0.3)
         assert names(left) == before
         assert not told
-    thread.join(timeout=60)
+    thread.join()
     assert "removed maze/surplus.png" in told[0]

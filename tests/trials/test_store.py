@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import signal
 import sqlite3
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from replication.errors import UserError
 from replication.irl import Snapshots, Trial
 from replication.irl.agent import Episode
 from replication.trials.store import DamagedTrialError, Store
@@ -172,7 +174,6 @@ def test_a_batch_that_fails_half_way_stores_nothing(store_path: Path) -> None:
 
 def test_other_threads_may_read_and_write(store_path: Path) -> None:
     """Threads that open a store and fill it at the same time lose nothing."""
-    Store(store_path)  # SQLite does not wait for whoever is making the file
     keys = [f"{k}" for k in range(40)]
 
     def write(some: list[str]) -> None:
@@ -265,11 +266,53 @@ def test_a_damaged_file_is_set_aside(
     assert len(list(store_path.parent.glob("*.damaged*"))) == 1
 
 
-def test_a_store_that_cannot_be_used_is_an_error(tmp_path: Path) -> None:
-    """A folder in the place of the file is an error, and not set aside."""
-    with pytest.raises(OSError, match="the store cannot be used"):
-        Store(tmp_path)
-    assert tmp_path.is_dir()
+@pytest.mark.parametrize("what", ["folder", "pipe", "device"])
+def test_a_store_that_cannot_be_used_is_an_error(store_path: Path, what: str) -> None:
+    """A folder, a pipe or a device in the place of the file is an error, and not set aside."""
+    store_path.parent.mkdir()
+    if what == "folder":
+        store_path.mkdir()
+    elif what == "pipe":
+        os.mkfifo(store_path)
+    else:
+        store_path.symlink_to("/dev/zero")
+    with pytest.raises(UserError, match="the store cannot be used: it is no regular file"):
+        Store(store_path)
+    assert list(store_path.parent.iterdir()) == [store_path]
+
+
+@pytest.mark.parametrize("content", [None, b"no database, but as long as its header" * 9])
+def test_many_may_open_a_new_store_at_once(tmp_path: Path, content: bytes | None) -> None:
+    """Threads and processes that open it at one instant all do, and lose nothing of each other."""
+    rounds, many = 20, 4
+    paths = [tmp_path / f"{n}.sqlite" for n in range(rounds)]
+    for path in paths if content else []:
+        path.write_bytes(content or b"")
+    program = f"""
+import pathlib, threading
+from replication.trials.store import Store
+barrier = threading.Barrier({many})
+
+def fill(k):
+    for path in {[str(path) for path in paths]!r}:
+        barrier.wait()
+        try:
+            Store(pathlib.Path(path)).put([(f"{{sys.argv[2]}}/{{k}}", batch(0, 0)[0][1])])
+        except BaseException:
+            os._exit(1)  # the others would wait for this thread
+
+threads = [threading.Thread(target=fill, args=(k,)) for k in range({many})]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+"""
+    processes = [child(program, tmp_path / "any.sqlite", str(p)) for p in range(2)]
+    for process in processes:
+        with process:
+            pass
+        assert process.returncode == 0
+    keys = {f"{p}/{k}" for p in range(2) for k in range(many)}
+    for path in paths:
+        assert Store(path).known(keys) == keys
 
 
 def test_a_store_belongs_to_its_thread(store_path: Path) -> None:
@@ -289,11 +332,10 @@ def test_a_store_belongs_to_its_thread(store_path: Path) -> None:
     assert len(errors) == 1
 
 
-def child(program: str, path: Path) -> subprocess.Popen[str]:
+def child(program: str, path: Path, *words: str) -> subprocess.Popen[str]:
     """Start another process on the store."""
-    return subprocess.Popen(
-        [sys.executable, "-c", CHILD + program, str(path)], stdout=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-c", CHILD + program, str(path), *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
 def stored_batches(path: Path, n: int) -> list[int]:
