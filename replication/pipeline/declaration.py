@@ -44,7 +44,7 @@ def _plain(names: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if not re.fullmatch(r"\w[\w.-]*", name):
             raise ValueError(f"{name!r} is not a plain name without a folder")
-        if name in (EXECUTED, MANIFEST, TRIALS):
+        if name in (EXECUTED, MANIFEST):
             raise ValueError(f"{name!r} is written by every run")
         if names.count(name) > 1:
             raise ValueError(f"{name!r} stands there twice")

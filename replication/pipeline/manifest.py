@@ -55,6 +55,9 @@ def state_of(folder: Path, inputs: Inputs) -> State:
     if len(lost) == len(manifest["outputs"]) and set(lost.values()) == {"missing"}:
         return State(MISSING)
     why = changes(manifest["inputs"], inputs) + [f"{name} is {how}" for name, how in lost.items()]
+    # a manifest says nothing about a file that it does not name
+    unnamed = sorted({*inputs["outputs"], EXECUTED} - manifest["outputs"].keys())
+    why += [f"{name} is not in {MANIFEST}" for name in unnamed]
     return State(STALE, tuple(why)) if why else State(FRESH)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from replication.pipeline.declaration import MANIFEST
-from replication.pipeline.folders import exclusive
+from replication.pipeline.folders import exclusive, is_published
 from replication.pipeline.manifest import (
     FRESH,
     MISSING,
@@ -28,7 +28,7 @@ def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) ->
     recommended have the `options` that choose these outputs.
     """
     recorded = read_runs(out)
-    lines, due = [], []
+    lines, due, edited = [], [], False
     for run in runs:
         state, last = run.state, recorded.get(run.name)
         when = f" ({last['seconds']:.0f} s, {_age(last['finished'])})" if last else ""
@@ -36,6 +36,7 @@ def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) ->
         lines += [f"    because {reason}" for reason in _shortened(state.why)]
         if state.kind != FRESH:
             due.append(run.name)
+            edited |= is_published(out) and bool(run.edits)
         manifest = read_manifest(run.folder)
         lost = damaged(run.folder, manifest) if manifest else {}
         for stem, names in _by_stem(run.notebook.declared.outputs).items():
@@ -48,7 +49,8 @@ def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) ->
     left = gone(runs, out)
     lines += [*(f"{name}: its notebook is gone" for name in left), ""]
     if due:
-        lines.append(f"to bring {out.name} up to date: {_command('run', *due, *options)}")
+        words = ["--publish"] if edited else []
+        lines.append(f"to bring {out.name} up to date: {_command('run', *due, *options, *words)}")
     else:
         lines.append(f"everything is fresh; {_command('verify', *options)} proves it")
     if left:

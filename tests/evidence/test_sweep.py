@@ -33,14 +33,14 @@ def test_limits_reach_the_plan() -> None:
 
 def test_effects_are_those_of_a_part(tmp_path: Path) -> None:
     """The claims declared for a part are evaluated under its own specifications."""
-    groups = sweep.plan(most_trials=2, most_specifications=1)
+    groups = sweep.plan(most_trials=3, most_specifications=1)
     mazes = [group for group in groups if group.labels["part"] == "mazes"]
     trials = computed_table(mazes, store=Store(tmp_path / "trials.sqlite"), seed=7)
     others = trials.assign(part="factorial", iterations=0)
     table = sweep.effects(pd.concat([others, trials]), "mazes")
     assert table["claim"].tolist() == list(sweep.PLAN.mazes.claims)
     assert set(table["specification"]) == {"default"}
-    assert set(table["n"]) == {2}
+    assert set(table["n"]) == {3}
     assert table.equals(sweep.effects(trials, "mazes"))
 
 

@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from replication.pipeline import manifest
-from replication.pipeline.declaration import MANIFEST
+from replication.pipeline.declaration import EXECUTED, MANIFEST
 from replication.pipeline.manifest import (
     damaged,
     output_hash,
     published_folders,
     read_manifest,
+    save_manifest,
     state_of,
     write_manifest,
 )
@@ -34,7 +35,8 @@ def folder(tmp_path: Path) -> Path:
     folder = tmp_path / "toy"
     folder.mkdir()
     (folder / "a.csv").write_text("1")
-    write_manifest(folder, INPUTS, ("a.csv",))
+    (folder / EXECUTED).write_text("{}")
+    write_manifest(folder, INPUTS, ("a.csv", EXECUTED))
     return folder
 
 
@@ -43,7 +45,8 @@ def test_equal_runs_have_equal_manifests(folder: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
     (other / "a.csv").write_text("1")
-    write_manifest(other, dict(reversed(INPUTS.items())), ("a.csv",))
+    (other / EXECUTED).write_text("{}")
+    write_manifest(other, dict(reversed(INPUTS.items())), ("a.csv", EXECUTED))
     assert (other / MANIFEST).read_bytes() == (folder / MANIFEST).read_bytes()
     assert str(tmp_path) not in (folder / MANIFEST).read_text()
     assert list(published_folders(tmp_path)) == ["other", "toy"]
@@ -59,12 +62,22 @@ def test_damage_is_told_apart(folder: Path) -> None:
     assert damaged(folder, known) == {"a.csv": "missing"}
 
 
+def test_a_record_names_every_declared_file(folder: Path) -> None:
+    """A file that was taken out of the manifest, and may have been changed, is not fresh."""
+    manifest = read_manifest(folder)
+    for name in ("a.csv", EXECUTED):
+        outputs = {other: value for other, value in manifest["outputs"].items() if other != name}
+        save_manifest(folder, manifest | {"outputs": outputs})
+        assert state_of(folder, INPUTS).why == (f"{name} is not in provenance.json",)
+
+
 def test_states_are_told_apart(folder: Path, tmp_path: Path) -> None:
     """Fresh, stale for a reason, without a record, and missing."""
     assert state_of(folder, INPUTS).kind == "fresh"
     stale = state_of(folder, INPUTS | {"lock": "1"})
     assert (stale.kind, stale.why) == ("stale", ("environment.lock has changed",))
-    (folder / "a.csv").unlink()
+    for name in ("a.csv", EXECUTED):
+        (folder / name).unlink()
     assert state_of(folder, INPUTS).kind == "missing"
     (folder / MANIFEST).write_text("{")
     assert state_of(folder, INPUTS).why == ("there is no record of how they were made",)

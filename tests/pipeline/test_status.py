@@ -87,7 +87,7 @@ def test_what_is_stale_has_its_reasons(project: Path) -> None:
         "    because environment.lock has changed",
     ]
     assert [line.split()[0] for line in found[3:6]] == ["stale"] * 3
-    assert found[-1] == "to bring figures up to date: replicate run maze"
+    assert found[-1] == "to bring figures up to date: replicate run maze --publish"
 
 
 def test_damaged_outputs_are_told_apart(project: Path) -> None:
@@ -119,7 +119,7 @@ def test_notebooks_have_states_of_their_own(project: Path) -> None:
         "maze: fresh",
         "open: stale",
         "third: missing",
-        "to bring figures up to date: replicate run open third",
+        "to bring figures up to date: replicate run open third --publish",
     ]
 
 
