@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import resource
@@ -20,6 +21,7 @@ from replication.files import (
     ROOM,
     FileError,
     check_writable,
+    open_lock,
     parse_json,
     read_file,
     read_json,
@@ -102,6 +104,14 @@ def test_json_is_read_as_elsewhere() -> None:
     assert parse_json("[" * DEEPEST + "]" * DEEPEST)
     with pytest.raises(UnicodeDecodeError):
         parse_json("3".encode("utf-16"))
+
+
+def test_a_lock_does_not_wait_for_a_pipe(tmp_path: Path) -> None:
+    """A file is made to be locked, and a pipe in its place, which nobody writes to, serves too."""
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("pipe", "new", "new"):
+        with open_lock(tmp_path / name) as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 # --- writing ---------------------------------------------------------------------------------

@@ -34,6 +34,9 @@ READ = (
 )
 """Every page that is written for readers; others list code."""
 
+PATIENCE = 1_200_000
+"""Milliseconds after which something hangs, on however slow a machine."""
+
 SMALL = 5_000_000
 """Bytes that a page may have, with all that it loads."""
 
@@ -51,7 +54,9 @@ def browser() -> Iterator[Browser]:
     quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--no-first-run", *quiet]
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--no-first-run", *quiet],
+            timeout=PATIENCE,
         )
         yield browser
         browser.close()
@@ -68,6 +73,7 @@ def open_page(browser: Browser, site: Path) -> Iterator[Open]:
 
     def open_page(name: str, *, size: dict[str, int] = WIDE, **options: Any) -> Page:
         contexts.append(browser.new_context(viewport=size, **options))  # type: ignore[arg-type]
+        contexts[-1].set_default_timeout(PATIENCE)
         page = contexts[-1].new_page()
         page.on("console", lambda line: faults.extend([line.text] * (line.type == "error")))
         page.on("pageerror", lambda error: faults.append(str(error)))
@@ -267,7 +273,7 @@ def test_tables_sort(open_page: Open, by: str) -> None:
             head.focus()
             page.keyboard.press("Enter")
         assert head.get_attribute("aria-sort") == direction
-        for _ in range(50):  # the rows move a moment after the click
+        for _ in range(PATIENCE // 100):  # the rows move a moment after the click
             if [float(cell) for cell in column(page, number)] == order:
                 break
             page.wait_for_timeout(100)

@@ -30,6 +30,9 @@ from replication.trials.run import run_trials
 from replication.trials.store import Store
 from tests.notebooks import write_notebook
 
+PATIENCE = 1200
+"""Seconds after which something hangs, on however slow a machine."""
+
 TASKS, TRIALS = 12, 3
 """The toy notebook's trials: so many tasks, each a chunk of so many trials."""
 
@@ -73,7 +76,7 @@ conditions = [
 results = computing.run_trials(conditions, trials=trials, store=Store(store), jobs=jobs, seed=seed)
 """,
     """
-errors = [d for condition in conditions for d in results.errors(condition).ravel().tolist()]
+errors = [d for condition in conditions for k in range(trials) for d in results.trial(condition, k).errors.tolist()]
 rows = [d.hex() for d in errors]
 (Path(out) / "curves.csv").write_text("\\n".join(rows))
 measure_trials(results, conditions).to_csv(Path(out) / "trials.csv", index=False)
@@ -111,7 +114,7 @@ def _snapshot() -> Path:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     shutil.copytree(PROJECT / "replication", folder / "replication")
     shutil.copy2(PROJECT / "environment.lock", folder)
-    subprocess.run([sys.executable, "-c", WARM], cwd=folder, check=True, timeout=600)
+    subprocess.run([sys.executable, "-c", WARM], cwd=folder, check=True)
     return folder
 
 
@@ -190,7 +193,7 @@ class Checkout:
     def run(self, *words: str | Path, code: int = 0, **options: Any) -> Ended:
         """Run `replicate` to its end and expect an exit code; no process may survive."""
         process = self.start(*words, **options)
-        said, complained = process.communicate(timeout=600)
+        said, complained = process.communicate(timeout=PATIENCE)
         assert process.returncode == code, complained
         assert gone(self.mark)
         return Ended(said, complained)
@@ -247,14 +250,14 @@ def alive(mark: str) -> list[int]:
     return found
 
 
-def gone(mark: str, seconds: float = 60) -> bool:
+def gone(mark: str) -> bool:
     """Wait until no process carries a mark."""
-    return wait(lambda: not alive(mark), seconds)
+    return wait(lambda: not alive(mark))
 
 
-def wait(condition: Callable[[], object], seconds: float = 60) -> bool:
+def wait(condition: Callable[[], object]) -> bool:
     """Wait until a condition holds; return whether it does."""
-    end = time.monotonic() + seconds
+    end = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > end:
             return False

@@ -21,7 +21,16 @@ from replication.irl import Trial
 from replication.progress import SCHEDULER
 from replication.trials.run import WorkerError
 from replication.trials.store import Store
-from tests.faults.checkout import Checkout, Reference, bits, gone, listening, run_few, wait
+from tests.faults.checkout import (
+    PATIENCE,
+    Checkout,
+    Reference,
+    bits,
+    gone,
+    listening,
+    run_few,
+    wait,
+)
 
 # distributed leaves sockets to the garbage collector
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -71,7 +80,7 @@ def start(tmp_path: Path) -> Iterator[StartCluster]:
         )
         running.append(process)
         assert process.stdout is not None
-        limit = threading.Timer(120, process.kill)  # which ends the line
+        limit = threading.Timer(PATIENCE, process.kill)  # which ends the line
         limit.start()
         address, *workers = process.stdout.readline().split()
         limit.cancel()
@@ -79,7 +88,7 @@ def start(tmp_path: Path) -> Iterator[StartCluster]:
 
     yield start
     for process in running:
-        process.communicate(timeout=60)  # closes its input, at which it ends
+        process.communicate(timeout=PATIENCE)  # closes its input, at which it ends
 
 
 @pytest.mark.parametrize("killed", [False, True])
@@ -136,7 +145,7 @@ def test_the_cluster_of_the_manual(checkout: Checkout, reference: Reference) -> 
         subprocess.Popen(
             [sys.executable, "-m", "dask", *shlex.split(command)],
             cwd=checkout.scratch,
-            env=os.environ | checkout.variables | {"TOY_PAUSE": "0.3"},
+            env=os.environ | checkout.variables,
             stderr=subprocess.DEVNULL,
         )
         for command in commands
@@ -144,17 +153,19 @@ def test_the_cluster_of_the_manual(checkout: Checkout, reference: Reference) -> 
     try:
         assert len(cluster) == 2
         assert wait(lambda: len(_children(cluster[1].pid)) == 2)
+        checkout.gate.touch()
         run = checkout.start("run", "--scheduler", f"tcp://127.0.0.1:{port}")
         assert wait(lambda: checkout.computed)
         assert listening(checkout.mark) == {"127.0.0.1"}
         os.kill(_children(cluster[1].pid)[0], signal.SIGKILL)
-        complained = run.communicate(timeout=120)[1]
+        checkout.gate.unlink()
+        complained = run.communicate(timeout=PATIENCE)[1]
         assert run.returncode == 0, complained
         assert checkout.results() == reference.results
     finally:
         for process in reversed(cluster):
             process.terminate()
-            process.wait(timeout=60)
+            process.wait(timeout=PATIENCE)
     assert gone(checkout.mark)
 
 

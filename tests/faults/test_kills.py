@@ -14,6 +14,7 @@ import pytest
 
 from replication.files import PROJECT
 from tests.faults.checkout import (
+    PATIENCE,
     TASKS,
     TRIALS,
     Checkout,
@@ -41,12 +42,16 @@ def _kill(checkout: Checkout, rng: np.random.Generator, seconds: float) -> None:
                 os.kill(pid, signal.SIGKILL)
             except ProcessLookupError:
                 continue
-    process.communicate(timeout=60)  # until nobody holds the pipes
+    process.communicate(timeout=PATIENCE)  # until nobody holds the pipes
     # Orphans notice within seconds, and publish nothing.
-    figures = checkout.folder / "figures"
-    before = sorted(figures.rglob("[!.]*"))
+    before = _published(checkout)
     assert gone(checkout.mark)
-    assert sorted(figures.rglob("[!.]*")) == before
+    assert _published(checkout) == before
+
+
+def _published(checkout: Checkout) -> list[Path]:
+    """Return all that is neither a draft nor in one."""
+    return sorted((checkout.folder / "figures").glob("[!.]*/[!.]*"))
 
 
 def _killed(folder: Path, reference: Reference, *, kills: int, seed: int) -> None:
@@ -66,6 +71,7 @@ def _killed(folder: Path, reference: Reference, *, kills: int, seed: int) -> Non
     if "fresh" not in ended.out:  # the last kill may have come too late
         assert len(checkout.computed) == TASKS * TRIALS - len(seen)
     assert drafts(checkout.folder / "figures", checkout.folder / "build") == []
+    assert not list(checkout.scratch.glob("replicate-*"))
     assert "fresh" in checkout.run("run").out
 
 
@@ -90,11 +96,11 @@ def test_ctrl_c_keeps_what_is_finished(
     """Ctrl-C, also an impatient one, has one line and code 130; the same command goes on."""
     checkout.gate.touch()
     process = checkout.start("run", "--jobs", "2")
-    assert wait(lambda: checkout.stored, 300)
+    assert wait(lambda: checkout.stored)
     for _ in range(times):
         os.killpg(process.pid, signal.SIGINT)
         time.sleep(0.2)
-    said, complained = process.communicate(timeout=60)
+    said, complained = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     error = Ended(said, complained).error
     assert "finished notebooks and trials are kept" in error
@@ -112,20 +118,32 @@ def test_ctrl_c_keeps_what_is_finished(
     assert len(checkout.computed) == TASKS * TRIALS - len(kept)
 
 
+WAITING = """
+import os, time
+
+def compute(*_, **__):
+    while os.path.exists(os.environ["TOY_GATE"]):
+        time.sleep(0.02)
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
     """However verify is ended, so are the processes that compute for it."""
     demos = PROJECT / "data" / "demos" / "open_maze.json"
     shutil.copy2(demos, checkout.folder / "data" / "demos")
-    rows = [f"open-maze,unified,printed,none,{k},1,9,1,9,sha256:0\n" for k in range(2000)]
+    rows = [f"open-maze,unified,printed,none,{k},1,9,1,9,sha256:0\n" for k in range(100)]
     (checkout.folder / "figures" / "open_maze").mkdir(parents=True)
     (checkout.folder / "figures" / "open_maze" / "trials.csv").write_text(
         "task,method,reading,set,trial,seed,iterations,converged,steps,digest\n" + "".join(rows)
     )
+    with (checkout.folder / "replication" / "evidence" / "recompute.py").open("a") as module:
+        module.write(WAITING)
+    checkout.gate.touch()
     process = checkout.start("verify", "--jobs", "2")
-    assert wait(lambda: len(alive(checkout.mark)) >= 3, 300)
+    assert wait(lambda: len(alive(checkout.mark)) >= 3)
     process.send_signal(number)
-    complained = process.communicate(timeout=60)[1]
+    complained = process.communicate(timeout=PATIENCE)[1]
     if number == signal.SIGKILL:
         assert process.returncode == -signal.SIGKILL
     else:
@@ -139,13 +157,13 @@ def test_a_second_run_waits_for_the_first(checkout: Checkout, reference: Referen
     """Of two runs at once, the second says that it waits, and then finds everything fresh."""
     checkout.gate.touch()
     first = checkout.start("run")
-    assert wait(lambda: checkout.computed, 300)
+    assert wait(lambda: checkout.computed)
     second = checkout.start("run")
     assert second.stdout is not None
     waits = second.stdout.readline()
     assert re.fullmatch(r"another run writes to .*: waiting until it ends\n", waits)
     checkout.gate.unlink()
-    said = [process.communicate(timeout=300)[0] for process in (first, second)]
+    said = [process.communicate(timeout=PATIENCE)[0] for process in (first, second)]
     assert (first.returncode, second.returncode) == (0, 0)
     assert "waiting" not in said[0]
     assert said[1].startswith("toy: fresh, nothing to do\n")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
-from tests.faults.checkout import Checkout, Reference, listening, run_first
+from tests.faults.checkout import PATIENCE, Checkout, Reference, listening, run_first, wait
 
 GUARD = """
 import os, sys
@@ -33,16 +32,15 @@ sys.addaudithook(guard)
 def test_no_network_is_used(checkout: Checkout, reference: Reference) -> None:
     """With all but loopback cut off a run is the same, and nothing listens elsewhere."""
     log = checkout.scratch / "refused"
-    checkout.environment |= {"GUARD_LOG": str(log), "TOY_PAUSE": "0.1"}
+    checkout.environment |= {"GUARD_LOG": str(log)}
     run_first(checkout, GUARD)
+    checkout.gate.touch()
     process = checkout.start("run", "--jobs", "2")
-    seen: set[str] = set()
-    while process.poll() is None:
-        seen |= listening(checkout.mark)
-        time.sleep(0.1)
-    assert process.communicate()[1] is not None
-    assert process.returncode == 0
-    assert seen == {"127.0.0.1"}
+    assert wait(lambda: checkout.computed)
+    assert listening(checkout.mark) == {"127.0.0.1"}
+    checkout.gate.unlink()
+    complained = process.communicate(timeout=PATIENCE)[1]
+    assert process.returncode == 0, complained
     assert not log.exists()
     assert checkout.results() == reference.results
 

@@ -16,6 +16,10 @@ from tests.notebooks import write_notebook
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 
 SOCCER = str(PROJECT / "data" / "demos" / "soccer.json")
+
+PATIENCE = 1200
+"""Seconds after which something hangs, on however slow a machine."""
+
 PROGRAM = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     "import sys; from pathlib import Path; from replication import files\n"
@@ -43,7 +47,7 @@ def interrupted(
 ) -> None:
     """Interrupt a run some seconds after its cell or driver has begun; check how it ends."""
     begin = f"from pathlib import Path\nPath({str(project / 'begun')!r}).touch()"
-    write_notebook(project / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(300)")
+    write_notebook(project / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(36_000)")
     (project / "environment.lock").touch()
     scratch = project / "scratch"
     scratch.mkdir()
@@ -54,7 +58,7 @@ def interrupted(
         text=True,
         env=os.environ | {"TMPDIR": str(scratch)},
     )
-    end = time.monotonic() + 120
+    end = time.monotonic() + PATIENCE
     while not (marked(scratch) if starting else (project / "begun").exists()):
         assert process.poll() is None
         assert time.monotonic() < end
@@ -62,7 +66,7 @@ def interrupted(
     time.sleep(seconds)
     started = marked(scratch)
     process.send_signal(number)
-    shown = process.communicate(timeout=120)[1]
+    shown = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode == 130, shown
     assert len(shown.splitlines()) == 1, shown
     assert shown.startswith("error: interrupted; ")
