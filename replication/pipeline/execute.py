@@ -22,7 +22,7 @@ from replication.errors import UserError
 from replication.files import scratch_folder, write_file
 from replication.pipeline.notebook import Notebook, RunError, first_line, refuse
 from replication.pipeline.rendering import as_text, clean, link_players, read_executed
-from replication.progress import EVENTS, Display
+from replication.progress import EVENTS, GIVEN, Display
 
 KERNEL = "replication"
 
@@ -120,6 +120,7 @@ def _environment(scratch: Path) -> dict[str, str]:
         "PYTHONSTARTUP": "",
         "PYTHONHASHSEED": "0",  # sets keep their order from run to run
         EVENTS: str(scratch / "events"),
+        GIVEN: "",  # trials are given by who verifies, not by who happens to have it set
     }
 
 

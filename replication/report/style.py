@@ -58,7 +58,11 @@ def style() -> AbstractContextManager[None]:
 
 
 def settled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in our style and settle the layout, else each save would go on from the one before."""
+    """Draw in our style and settle the layout, else each save would go on from the one before.
+
+    Positions are rounded: their last bits depend on addresses in memory, and the ids of an SVG on
+    them.
+    """
 
     @functools.wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
@@ -66,6 +70,8 @@ def settled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
             figure = draw(*args, **kwargs)
             figure.draw_without_rendering()
         figure.set_layout_engine("none")
+        for axes in figure.axes:
+            axes.set_position(np.round(axes.get_position(original=True).bounds, 9).tolist())
         return figure
 
     return wrapper

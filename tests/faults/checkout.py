@@ -76,7 +76,8 @@ conditions = [
 results = computing.run_trials(conditions, trials=trials, store=Store(store), jobs=jobs, seed=seed)
 """,
     """
-errors = [d for condition in conditions for k in range(trials) for d in results.trial(condition, k).errors.tolist()]
+every = [results.trial(condition, k) for condition in conditions for k in range(trials)]
+errors = [d for trial in every for d in trial.errors.tolist()]
 rows = [d.hex() for d in errors]
 (Path(out) / "curves.csv").write_text("\\n".join(rows))
 measure_trials(results, conditions).to_csv(Path(out) / "trials.csv", index=False)

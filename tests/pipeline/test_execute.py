@@ -19,7 +19,7 @@ from replication.pipeline import driver
 from replication.pipeline.execute import KERNEL, _environment, execute
 from replication.pipeline.notebook import NotebookError, RunError, read_notebook
 from replication.pipeline.rendering import rendered
-from replication.progress import SCHEDULER, Display
+from replication.progress import GIVEN, SCHEDULER, Display
 from tests.notebooks import write_notebook
 
 PARAMETERS = 'trials = 3\nname = "a"\njobs = 1\nstore = "build/s"\nout = "build"'
@@ -208,6 +208,14 @@ def test_settings_reach_the_notebook(project: Path, run: Run) -> None:
     write(project, f"import os\nprint(os.environ[{SCHEDULER!r}])")
     (output,) = cells(run(settings={SCHEDULER: "tcp://given:1"}))[-1].outputs
     assert output.text == "tcp://given:1\n"
+
+
+def test_trials_are_never_given_by_accident(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A variable that somebody has set does not let a run publish other trials than it computes."""
+    monkeypatch.setenv(GIVEN, "somewhere")
+    assert _environment(tmp_path)[GIVEN] == ""
 
 
 def test_a_scheduler_of_the_user_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -142,3 +142,11 @@ def test_files_hold_keys(kind: str, tables: dict[str, pd.DataFrame]) -> None:
     if "method" in table:
         assert set(table["method"]) <= {"adaboost", "unified", "unified-incorrect"}
         assert set(table["reading"]) <= {"", "printed", "updated"}
+
+
+def test_positions_do_not_depend_on_addresses(pictures: dict[str, Picture]) -> None:
+    """Axes stand at rounded positions, so that equal numbers give equal bytes in every process."""
+    for picture in pictures.values():
+        for axes in picture.draw(picture.numbers).axes:
+            bounds = axes.get_position(original=True).bounds
+            assert [round(value, 9) for value in bounds] == pytest.approx(bounds, abs=1e-15)
