@@ -34,6 +34,7 @@ FUNCTIONS = ("open", "json.load", "json.loads", "nbformat.read", "np.load", "pd.
 """What opens a file, or reads JSON of any depth."""
 
 MAY_OPEN = {
+    "replication.__main__": "opens the null device",
     "replication.files": "is the door",
     "replication.source": "reads the package's code",
     "replication.paper.register": "reads a resource of the package",

@@ -267,7 +267,7 @@ def test_check_answers_by_its_exit_code(project: Path) -> None:
     assert replicate("run", "--check", "--force").exit_code == 0
     path = project / "notebooks" / "toy.ipynb"
     path.write_text(path.read_text().replace("| {trials}", "| so {trials}"))
-    result = replicate("run", "--check")
+    result = replicate("run", "--check", "--publish")
     assert result.exit_code == 1
     folder = project / "figures" / "toy"
     assert result.stderr == f"error: other bytes than published before: {folder / 'seen.md'}\n"
@@ -560,7 +560,6 @@ def test_make_refuses_in_one_line(tmp_path: Path) -> None:
     assert "map.txt would be overwritten" in refused(
         "demos", "make", drawn, "--task", "mine", "--out", drawn
     )
-    os.mkfifo(tmp_path / "pipe")
     assert "is not a regular file" in refused(
         "demos", "make", drawn, "--task", "mine", "--out", tmp_path / "pipe"
     )

@@ -177,7 +177,7 @@ def _read(path: Path) -> pd.DataFrame:
 
 def _as_text(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table as it is read back as text."""
-    return pd.read_csv(io.StringIO(csv_text(table)), dtype=str, keep_default_na=False)
+    return pd.read_csv(io.BytesIO(csv_text(table).encode()), dtype=str, keep_default_na=False)
 
 
 def _agrees(stored: Store, condition: Condition, root: int, k: int, trial: Trial) -> bool:

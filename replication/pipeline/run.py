@@ -28,14 +28,13 @@ from replication.pipeline.folders import (
     failed_notebook,
     is_published,
     outputs_folder,
-    store_file,
 )
 from replication.pipeline.index import write_index
-from replication.pipeline.inputs import changes
-from replication.pipeline.manifest import FRESH, read_runs, record_run, write_manifest
+from replication.pipeline.manifest import FRESH, read_runs, record_run
 from replication.pipeline.notebook import NotebookError, RunError, first_line
 from replication.pipeline.plan import Run, departures, prepare, run_name
-from replication.pipeline.publish import check_outputs, check_target, differing, draft_folder, swap
+from replication.pipeline.produce import produce, store_of, unpublished
+from replication.pipeline.publish import check_target, differing, draft_folder, swap
 from replication.progress import SCHEDULER, Display
 
 TIMEOUT = 3600
@@ -63,8 +62,9 @@ def destination(
     out = outputs_folder(run_name(profile, seed=asked["seed"], parameters=asked["parameters"]))
     if publish or not is_published(out):
         return out, ""
+    runs = prepare(notebooks, profile=profile, out=out, **asked)
     try:
-        _check_unedited(prepare(notebooks, profile=profile, out=out, **asked))
+        _check_unedited(runs)
     except NotebookError as error:
         return files.PROJECT / EDITED, str(error)
     return out, ""
@@ -223,7 +223,7 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
             differ = differing(stage, run.folder, notebook.published)
             swap(stage, run.folder)
         except OSError as error:
-            raise _unpublished(run, error) from error
+            raise unpublished(run, error) from error
     seconds = time.monotonic() - began
     record_run(run.out, run.name, seconds, options["display"].computed)
     failed.unlink(missing_ok=True)
@@ -234,63 +234,6 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
     echo(f"{run.name}: {number} output{'s' * (number != 1)} in {seconds:.1f} s{compared}")
     whole = (run.folder / name for name in notebook.published)
     return Published(tuple(whole), tuple(run.folder / name for name in differ or ()))
-
-
-def store_of(run: Run) -> Path:
-    """Return the file in which a run keeps its trials."""
-    literals = run.notebook.literals
-    return store_file(run.values.get("store", literals.get("store", "trials.sqlite")), run.out)
-
-
-def produce(run: Run, stage: Path, *, store: Path, failed: Path, **options: Any) -> None:
-    """Execute a notebook and write all that it publishes, the manifest included, into a folder.
-
-    Parameters
-    ----------
-    run
-        What to execute.
-    stage
-        The folder, which is empty.
-    store
-        The file of finished trials.
-    failed, **options
-        Those of :func:`execute.execute`.
-
-    Raises
-    ------
-    UserError, RunError
-        As `execute.execute`; also if the outputs are not those declared, cannot be written, or if
-        something that they depend on was edited meanwhile.
-    """
-    from replication.pipeline import execute  # loads nbformat, which takes a second
-
-    notebook = run.notebook
-    folders = {"results": run.out.resolve(), "store": store}
-    values = {name: str(path) for name, path in folders.items() if name in notebook.literals}
-    shown = {stage.resolve(): run.folder, run.out.resolve(): run.out}
-    executed = execute.execute(
-        notebook,
-        {**run.values, **values},
-        stage.resolve(),
-        folders=shown,
-        failed=failed,
-        **options,
-    )
-    check_outputs(notebook, stage)
-    if changed := changes(run.inputs, run.again().inputs):
-        reasons = ", ".join(f"{reason} during the run" for reason in changed)
-        raise RunError(f"{notebook.path}: {reasons}: nothing is published; run it again")
-    try:
-        write_file(stage / EXECUTED, executed)
-        write_manifest(stage, run.inputs, notebook.published)
-    except OSError as error:
-        raise _unpublished(run, error) from error
-
-
-def _unpublished(run: Run, error: OSError) -> RunError:
-    """Return what to raise if a folder cannot be written; the path of a draft would not help."""
-    reason = error.strerror or str(error)
-    return RunError(f"{run.notebook.path}: cannot publish to {run.out}: {reason}")
 
 
 def render_text(run: Run) -> None:

@@ -25,7 +25,7 @@ from replication.pipeline.inputs import changes
 from replication.pipeline.manifest import RUNS, damaged, read_manifest, versions
 from replication.pipeline.notebook import RunError
 from replication.pipeline.plan import Run
-from replication.pipeline.run import produce
+from replication.pipeline.produce import produce
 from replication.progress import GIVEN, Display
 
 

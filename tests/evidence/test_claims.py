@@ -33,6 +33,7 @@ from replication.evidence.tables import read_table
 from replication.files import PROJECT
 from replication.irl import METHODS, READINGS
 from replication.paper.published import FIGURE_5, FIGURE_12, TABLE_1, TABLE_2, Published
+from replication.pipeline.declaration import Declaration
 
 TEXT = (PROJECT / "replication" / "evidence" / "claims.toml").read_text(encoding="utf-8")
 DOCUMENT = tomllib.loads(TEXT)
@@ -291,6 +292,5 @@ def test_evidence_is_published(claim: Claim) -> None:
     """The output that a claim links to is declared by its notebook."""
     notebook, name = evidence(claim.task, claim.measure).split("/")
     text = (PROJECT / "notebooks" / f"{notebook}.ipynb").read_text(encoding="utf-8")
-    declared = json.loads(text)["metadata"]["replication"]
-    names = [*declared.get("figures", ()), *declared.get("tables", ())]
-    assert name in [*names, *(Path(file).stem for file in declared.get("data", ()))]
+    declared = Declaration.model_validate(json.loads(text)["metadata"]["replication"])
+    assert name in [Path(file).stem for file in declared.outputs]

@@ -25,7 +25,7 @@ from tests.faults.checkout import TASKS, TRIALS, Checkout, Reference, drafts, no
 FILL = """
 import resource, psutil
 from pathlib import Path
-(Path(out) / "a.txt").write_text("new" * 100_000 if trials in (1, 2) else "old")
+(Path(out) / "a.txt").write_text("new" * 1_000_000 if trials in (1, 2) else "old")
 if trials in (2, 3):
     parents = psutil.Process().parents()  # the driver, and the run itself
     pid = parents[0 if trials == 3 else 1].pid
@@ -42,7 +42,7 @@ def test_a_full_disk_leaves_the_old_output(checkout: Checkout, trials: int) -> N
     before = checkout.results("here")
     limit: dict[str, Any] = {}
     if trials == 1:
-        limit["preexec_fn"] = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000,) * 2)
+        limit["preexec_fn"] = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000,) * 2)
     words = ("run", "--out", "here", "-p", "trials", str(trials))
     error = checkout.run(*words, code=1, **limit).error
     assert "file too large" in error.lower()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -126,22 +127,31 @@ def compute(*_, **__):
         time.sleep(0.02)
 """
 
+SOUND = """
+verify_folder = verify_records = lambda *_: []
+verify_outputs = lambda *_, **__: []
+"""
+
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_verification_leaves_no_workers(checkout: Checkout, number: signal.Signals) -> None:
-    """However verify is ended, so are the processes that compute for it."""
+    """However verify is ended while it recomputes trials, so are the processes that do."""
     demos = PROJECT / "data" / "demos" / "open_maze.json"
     shutil.copy2(demos, checkout.folder / "data" / "demos")
-    rows = [f"open-maze,unified,printed,none,{k},1,9,1,9,sha256:0\n" for k in range(100)]
-    (checkout.folder / "figures" / "open_maze").mkdir(parents=True)
-    (checkout.folder / "figures" / "open_maze" / "trials.csv").write_text(
-        "task,method,reading,set,trial,seed,iterations,converged,steps,digest\n" + "".join(rows)
-    )
-    with (checkout.folder / "replication" / "evidence" / "recompute.py").open("a") as module:
-        module.write(WAITING)
+    rows = [f"open-maze,unified,printed,none,{k},1\n" for k in range(100)]
+    table = checkout.folder / "figures" / "toy" / "trials.csv"
+    table.parent.mkdir(parents=True)
+    table.write_text("task,method,reading,set,trial,seed\n" + "".join(rows))
+    path = checkout.folder / "notebooks" / "toy.ipynb"
+    document = json.loads(path.read_text())
+    document["metadata"]["replication"] |= {"data": ["curves.csv"], "trials": True}
+    path.write_text(json.dumps(document))
+    for module, code in (("evidence/recompute.py", WAITING), ("pipeline/verify.py", SOUND)):
+        with (checkout.folder / "replication" / module).open("a") as file:
+            file.write(code)
     checkout.gate.touch()
     process = checkout.start("verify", "--jobs", "2")
-    assert wait(lambda: len(alive(checkout.mark)) >= 3)
+    assert wait(lambda: len(alive(checkout.mark)) >= 3 or process.poll() is not None)
     process.send_signal(number)
     complained = process.communicate(timeout=PATIENCE)[1]
     if number == signal.SIGKILL:

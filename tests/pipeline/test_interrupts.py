@@ -109,7 +109,7 @@ def ended_early(project: Path, pause: float, number: int, *words: str) -> None:
 
 def importing(project: Path, *pauses: float) -> None:
     """Interrupt commands while they import; nothing is left."""
-    begin = "import time\ntime.sleep(300)"
+    begin = "import time\ntime.sleep(36_000)"
     write_notebook(project / "sleep.ipynb", begin)
     (project / "environment.lock").touch()
     for at, pause in enumerate(pauses):
@@ -133,13 +133,14 @@ def test_a_swallowed_interruption_is_repeated(tmp_path: Path) -> None:
         "    def __del__(self): signal.raise_signal(signal.SIGTERM)\n"
         "def runs(*_, **__):\n"
         "    Dropping()\n"
-        "    import time; time.sleep(300)\n"
+        "    import time; time.sleep(36_000)\n"
         "run.run_notebooks = runs\n"
         "main()",
     )
     write_notebook(tmp_path / "notebooks" / "toy.ipynb", "1")
+    (tmp_path / "environment.lock").touch()
     words = [sys.executable, "-c", program, str(tmp_path), "run"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 130
     assert re.fullmatch(r"error: interrupted; .*\n", done.stderr)
 

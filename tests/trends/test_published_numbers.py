@@ -78,7 +78,7 @@ def test_published_trials_are_what_the_code_computes(
         keys = part[FACTORS].drop_duplicates()
         conditions = [condition_of(*key) for key in keys.itertuples(index=False)]
         results = run_trials(conditions, trials=n, store=store, jobs=JOBS, seed=ROOT)
-        assert_same(part, measure_trials(results, conditions))
+        assert_same(part, measure_trials(results, conditions, errors=True))
 
 
 @pytest.mark.parametrize("task", EXPERIMENTS)
