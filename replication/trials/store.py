@@ -68,9 +68,14 @@ class Store:
             fcntl.flock(lock, fcntl.LOCK_EX)
             try:
                 self._open()
-            except sqlite3.OperationalError as error:
-                raise UserError(f"{printable(path)}: the store cannot be used: {error}") from None
-            except sqlite3.DatabaseError as error:
+            except (
+                sqlite3.DatabaseError,
+                UnicodeDecodeError,
+            ) as error:  # SQLite may quote any bytes
+                code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+                if isinstance(error, sqlite3.OperationalError) and code != sqlite3.SQLITE_ERROR:
+                    message = f"{printable(path)}: the store cannot be used: {error}"
+                    raise UserError(message) from None
                 self._set_aside(str(error))
                 self._open()
 
@@ -119,7 +124,9 @@ class Store:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
             connection.execute(_SCHEMA)
-            (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            connection.execute("SELECT key, record, snapshots FROM trials LIMIT 0")
+            # quick_check leaves out the index, by which each trial is found
+            (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError(verdict.splitlines()[-1])
 

@@ -266,6 +266,36 @@ def test_a_damaged_file_is_set_aside(
     assert len(list(store_path.parent.glob("*.damaged*"))) == 1
 
 
+@pytest.mark.parametrize(
+    ("sound", "damaged"),
+    [
+        (b"CREATE TABLE", b"CREATE T\xb8BLE"),
+        (b"CREATE TABLE trials (key", b"CREATE TABLE trials \xb8key"),
+        (b"record BLOB", b"rec0rd BLOB"),
+        (b"tabletrials", b"t\xb8bletrials"),
+        (b"tabletrials", b"tabletri\xb8ls"),
+        (b"\x03\x0f\x01b\x02", b"\x03\x0f\x01b\x03"),  # the index has the row of c under b
+        (b"\x03\x0f\x01b\x02", b"\x03\x0f\x01b\x09"),
+    ],
+)
+def test_a_damaged_file_is_never_taken_for_a_good_one(
+    store_path: Path, sound: bytes, damaged: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where SQLite's own description of the tables or index is damaged, the trials come again."""
+    store = Store(store_path)
+    store.put([(key, trial([1.0], 1)) for key in "abc"])
+    store._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    store._connection.close()
+    content = store_path.read_bytes()
+    assert sound in content
+    store_path.write_bytes(content.replace(sound, damaged, 1))
+    store = Store(store_path)
+    assert store.known("abc") == set()
+    store.put([("b", trial([2.0], 1))])
+    assert store.get("b").errors.tolist() == [2.0]
+    assert len(capsys.readouterr().err.splitlines()) <= 1
+
+
 @pytest.mark.parametrize("what", ["folder", "pipe", "device"])
 def test_a_store_that_cannot_be_used_is_an_error(store_path: Path, what: str) -> None:
     """A folder, a pipe or a device in the place of the file is an error, and not set aside."""
