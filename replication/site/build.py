@@ -171,6 +171,7 @@ def _write(work: Path) -> None:
     outline, known = _outline(work / "source"), work / "outline"
     if not known.exists() or read_text(known) != outline:
         command += ["-a", "-E"]  # every page shows it at its side, and may link to new pages
+        shutil.rmtree(work / "html", ignore_errors=True)  # with the pages of what is gone
     known.unlink(missing_ok=True)
     command += [str(work / "source"), str(work / "html")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -181,10 +182,12 @@ def _write(work: Path) -> None:
 
 
 def _outline(source: Path) -> str:
-    """Return the titles of the pages and their order."""
+    """Return the titles of the pages and their order, and the modules that have pages."""
     part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
     pages = (read_text(path) for path in sorted(source.glob("*.md")))
-    return "\n".join(title for text in pages for title in part.findall(text))
+    titles = [title for text in pages for title in part.findall(text)]
+    modules = sorted((files.PROJECT / "replication").rglob("*.py"))
+    return "\n".join([*titles, *(path.as_posix() for path in modules)])
 
 
 def _replace(new: Path, site: Path) -> None:

@@ -96,6 +96,17 @@ def test_a_site_follows_its_sources(project: Path) -> None:
     assert "New report" in notebook.read_text("utf-8")
 
 
+def test_pages_of_what_is_gone_are_removed(project: Path) -> None:
+    """When the modules of the package change, no page that was written for one before is kept."""
+    built(project)
+    left = project / "build" / "site-work" / "html" / "gone.html"
+    left.touch()
+    (project / "replication").mkdir()
+    (project / "replication" / "new.py").touch()
+    assert not (built(project) / "gone.html").exists()
+    assert not left.exists()
+
+
 @pytest.mark.usefixtures("no_sphinx")
 def test_a_stale_or_missing_notebook_stops_the_build(project: Path) -> None:
     """It is named, with the reason and what to do; the site that is there stays."""
