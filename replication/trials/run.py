@@ -7,6 +7,7 @@ the trials that it is computed with, or on whether it was computed now or read f
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 import time
@@ -116,6 +117,9 @@ def workers(jobs: int) -> Iterator[int]:
         return
     from distributed import Client
 
+    # what it logs of workers that come and go would stand in a published notebook
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.ERROR)
     with (
         Client(address, set_as_default=False) as client,  # type: ignore[no-untyped-call]
         joblib.parallel_config(backend="dask", client=client),
