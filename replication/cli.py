@@ -17,6 +17,7 @@ import shlex
 import shutil
 import signal
 import sys
+import tempfile
 import textwrap
 import time
 import warnings
@@ -360,6 +361,7 @@ def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None
     import joblib
 
     _catch_signals()
+    files.check_writable(Path(tempfile.gettempdir()))
     names = [_notebook(name).stem for name in notebooks]
     number = 0
     for line in _disagreements(names, jobs=jobs or joblib.cpu_count(), **options):

@@ -32,16 +32,13 @@ from replication.trials.results import digest
 from replication.trials.run import workers
 from replication.trials.store import DamagedTrialError, Store
 
-EVERY = 20
-"""One trial in so many is recomputed by default: 5 %."""
-
 
 def recompute_trials(
     tables: Mapping[str, Path],
     store: Path,
     *,
     seed: int,
-    every: int = EVERY,
+    every: int,
     jobs: int = 1,
     report: Callable[[int], object] = lambda _: None,
 ) -> Iterator[str]:
@@ -58,7 +55,7 @@ def recompute_trials(
     seed
         Of the sample. Who forges a table must not know it beforehand.
     every
-        One trial in so many is recomputed, at least one of each table.
+        One trial in so many is recomputed, and at least one of each table.
     jobs
         Worker processes.
     report

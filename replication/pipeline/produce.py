@@ -17,8 +17,8 @@ from replication.pipeline.publish import check_outputs
 
 def store_of(run: Run) -> Path:
     """Return the file in which a run keeps its trials."""
-    literals = run.notebook.literals
-    return store_file(run.values.get("store", literals.get("store", "trials.sqlite")), run.out)
+    given = {"store": "build/trials.sqlite", **run.notebook.literals, **run.values}
+    return store_file(given["store"], run.out)
 
 
 def produce(run: Run, stage: Path, *, store: Path, failed: Path, **options: Any) -> None:
