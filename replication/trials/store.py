@@ -15,9 +15,11 @@ import fcntl
 import json
 import math
 import sqlite3
+import stat
 import sys
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +62,10 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        if self.path.exists() and not self.path.is_file():
-            raise UserError(f"{printable(path)}: the store cannot be used: it is no regular file")
+        with suppress(FileNotFoundError):  # one look: another process may set it aside meanwhile
+            if not stat.S_ISREG(self.path.stat().st_mode):
+                message = f"{printable(path)}: the store cannot be used: it is no regular file"
+                raise UserError(message)
         self.path.parent.mkdir(parents=True, exist_ok=True)
         # SQLite does not wait for whoever is making the file, and a damaged one is set aside once
         with open_lock(self.path.with_name(f"{self.path.name}-lock")) as lock:

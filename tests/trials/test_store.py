@@ -319,7 +319,7 @@ def test_many_may_open_a_new_store_at_once(tmp_path: Path, content: bytes | None
     for path in paths if content else []:
         path.write_bytes(content or b"")
     program = f"""
-import pathlib, threading
+import pathlib, threading, traceback
 from replication.trials.store import Store
 barrier = threading.Barrier({many})
 
@@ -329,6 +329,7 @@ def fill(k):
         try:
             Store(pathlib.Path(path)).put([(f"{{sys.argv[2]}}/{{k}}", batch(0, 0)[0][1])])
         except BaseException:
+            traceback.print_exc()
             os._exit(1)  # the others would wait for this thread
 
 threads = [threading.Thread(target=fill, args=(k,)) for k in range({many})]
