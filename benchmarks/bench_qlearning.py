@@ -1,14 +1,17 @@
-"""The speed of Q-learning, on one core: the kernel beside plain C and plain Python.
+"""The speed of Q-learning, on one core: the compiled learner beside plain C and plain Python.
 
 Python stands twice: as the reference, which is written to be read, and as `python_learn`, the same
 loop on lists written for speed. Learners take turns, so that what else the machine does hits all of
-them alike, and the best of several rounds counts. Run as ``python -m pytest benchmarks -s``.
+them alike; shown are the best of several rounds and the ratio in the least and the most favourable
+round. Run as ``make bench``.
 """
 
 import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import thread_time
 from typing import Any
@@ -17,25 +20,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from replication.learning import compiled, qlearning, reference
+from replication import Demos, Params
+from replication.demos.files import load_demos
+from replication.files import PROJECT
+from replication.irl.agent import Episode
+from replication.learning import qlearning, reference
 from replication.learning.seeds import stream
+from replication.trials.condition import Condition
 
 Array = NDArray[Any]
-Learner = Callable[..., tuple[Array, Array, Array]]
+Learner = Callable[..., tuple[Array, Array, int]]
 
-SIZE = 20  # cells a side of the open maze
-OPTIONS: dict[str, Any] = {
-    "start": 18 * SIZE + 1,
-    "goal": 3 * SIZE + 17,
-    "horizon": 500,
-    "beta": 0.7,
-    "gamma": 0.9,
-    "epsilon": 0.1,
-}
+OPTIONS: dict[str, Any] = {"horizon": 500, "beta": 0.7, "gamma": 0.9, "epsilon": 0.1}
 ROUNDS = 5
 
 
-class Agent(ctypes.Structure):
+class Task(ctypes.Structure):
     """The `task` of qlearning.c."""
 
     _fields_ = (
@@ -47,84 +47,48 @@ class Agent(ctypes.Structure):
 
 
 @pytest.fixture(scope="module")
-def c_learn(tmp_path_factory: pytest.TempPathFactory) -> Learner | None:
-    """Compile qlearning.c and wrap it, or return None if there is no compiler."""
+def c_learn(tmp_path_factory: pytest.TempPathFactory) -> Learner:
+    """Compile qlearning.c and wrap it."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
-        return None
+        pytest.skip("there is no C compiler")
     library = tmp_path_factory.mktemp("c") / "qlearning.so"
     source = Path(__file__).with_name("qlearning.c")
     flags = ["-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, "-o", library, source], check=True)
     function = ctypes.CDLL(str(library)).learn
+    function.restype = ctypes.c_int64
 
     def learn(
-        next_state: Array, weights: Array, q: Array, streams: Array, **options: Any
-    ) -> tuple[Array, Array, Array]:
-        q, streams, steps = q.copy(), streams.copy(), np.empty(len(q), np.int64)
-        task = Agent(
+        next_state: Array, weights: Array, q: Array, stream: Array, **options: Any
+    ) -> tuple[Array, Array, int]:
+        q, stream = q.copy(), stream.copy()
+        task = Task(
             states=len(next_state),
-            threshold=round(options["epsilon"] * 2**32),
-            random_ties=1,
-            **{name: value for name, value in options.items() if name != "epsilon"},
+            threshold=round(options.pop("epsilon") * 2**32),
+            random_ties=options.pop("random_ties", True),
+            **options,
         )
-        arrays = [x.ctypes.data_as(ctypes.c_void_p) for x in (next_state, weights, q, streams)]
-        steps_pointer = steps.ctypes.data_as(ctypes.c_void_p)
-        function(ctypes.byref(task), ctypes.c_int64(len(q)), *arrays, steps_pointer)
-        return q, streams, steps
+        arrays = [x.ctypes.data_as(ctypes.c_void_p) for x in (next_state, weights, q, stream)]
+        return q, stream, function(ctypes.byref(task), *arrays)
 
     return learn
 
 
-def open_maze() -> Array:
-    """Return the transitions of an open maze: up, down, right, left."""
-    row, column = np.divmod(np.arange(SIZE**2), SIZE)
-    moves = ((-1, 0), (1, 0), (0, 1), (0, -1))
-    rows = [np.clip(row + down, 0, SIZE - 1) for down, _ in moves]
-    columns = [np.clip(column + right, 0, SIZE - 1) for _, right in moves]
-    return np.stack(rows, axis=1) * SIZE + np.stack(columns, axis=1)
-
-
-def make_load(kind: str, trials: int) -> tuple[Array, Array, Array, Array]:
-    """Return the arrays of a call.
-
-    In a `loop` the weights are random, so that the agent circles until the time is out, as early
-    in inverse reinforcement learning; along a `path` to the goal each step is worth 1, and any
-    other -1, as late in it; a `mixed` batch has both, so that its trials differ in length.
-    """
-    next_state = open_maze()
-    loop = np.random.default_rng(1).normal(size=(trials, *next_state.shape))
-    path = np.full(next_state.shape, -1.0)
-    state = OPTIONS["start"]
-    while state != OPTIONS["goal"]:
-        up = state // SIZE > OPTIONS["goal"] // SIZE and np.count_nonzero(path > 0) % 2 == 0
-        action = 0 if up or state % SIZE == OPTIONS["goal"] % SIZE else 2
-        path[state, action] = 1.0
-        state = next_state[state, action]
-    chance = np.random.default_rng(2).random(trials)[:, None, None]
-    weights = np.where(chance < {"loop": 1.0, "path": 0.0, "mixed": 0.5}[kind], loop, path)
-    seeds = np.random.SeedSequence(3).spawn(trials)
-    streams = np.array([stream(seed) for seed in seeds])
-    return next_state, weights, np.zeros_like(weights), streams
-
-
-def reference_learn(
-    next_state: Array, weights: Array, q: Array, streams: Array, **options: Any
-) -> tuple[Array, Array, Array]:
-    """Run the first trial by the reference."""
-    lists = (array.tolist() for array in (next_state, weights[0], q[0], streams[0]))
-    values, stream, steps = reference.learn(*lists, **options)
-    return np.array([values]), np.array([stream], np.uint64), np.array([steps])
+def reference_learn(*arrays: Array, **options: Any) -> tuple[Array, Array, int]:
+    """Learn by the reference."""
+    q, stream, steps = reference.learn(*(array.tolist() for array in arrays), **options)
+    return np.array(q), np.array(stream, np.uint64), steps
 
 
 def python_learn(
-    next_state: Array, weights: Array, q: Array, streams: Array, **options: Any
-) -> tuple[Array, Array, Array]:
-    """Run the first trial by a loop on lists that draws ahead and carries the best value along."""
-    successors, rewards, table = (x.tolist() for x in (next_state, weights[0], q[0]))
+    next_state: Array, weights: Array, q: Array, stream: Array, **options: Any
+) -> tuple[Array, Array, int]:
+    """Learn by a loop on lists that draws ahead and carries the best value along."""
+    successors, rewards, table = (x.tolist() for x in (next_state, weights, q))
     beta, gamma, epsilon = options["beta"], options["gamma"], options["epsilon"]
     start, goal, horizon = options["start"], options["goal"], options["horizon"]
-    rng, width, steps = np.random.default_rng(streams[0]), len(table[0]), 0
+    rng, width, steps = np.random.default_rng(stream), len(table[0]), 0
 
     def numbers() -> Iterator[float]:
         while True:
@@ -152,64 +116,128 @@ def python_learn(
             if successor == state:
                 best = max(row)
             state, row = successor, after
-    return np.array([table]), streams, np.array([steps])
+    return np.array(table), stream, steps
 
 
-def speeds(
-    learners: dict[str, Learner], arrays: Any, episodes: dict[str, int]
-) -> tuple[dict[str, float], Array]:
-    """Return each learner's best million steps per second, and the steps of the kernel's trials."""
-    best, steps = dict.fromkeys(learners, 0.0), {}
+def show(title: str, speeds: dict[str, list[float]]) -> None:
+    """Print the best speed of each learner, and the first one's ratios to the others."""
+    first, *others = speeds
+    print(f"\n{title:28}", *(f"{name} {max(x):7.4g}" for name, x in speeds.items()), end="  ")
+    for name in others:
+        ratios = np.array(speeds[first]) / speeds[name]
+        print(f"  {ratios.min():.3g}-{ratios.max():.3g} x {name}", end="")
+
+
+def measure(learners: dict[str, Callable[[], int]]) -> dict[str, list[float]]:
+    """Let learners take turns; return the million steps a second of each in each round."""
+    speeds: dict[str, list[float]] = {name: [] for name in learners}
+    for learner in learners.values():
+        learner()  # compiles
     for _ in range(ROUNDS):
         for name, learner in learners.items():
             begin = thread_time()
-            _, _, steps[name] = learner(*arrays, episodes=episodes[name], **OPTIONS)
-            speed = steps[name].sum() / (thread_time() - begin) / 1e6
-            best[name] = max(best[name], speed)
-    return best, steps["kernel"]
+            speeds[name].append(learner() / (thread_time() - begin) / 1e6)
+    return speeds
 
 
-def utilisation(steps: Array) -> float:
-    """Return the share of lane steps that belong to a trial, given each trial's steps."""
-    left, slots = steps.copy(), 0
-    while groups := compiled.count_groups(np.count_nonzero(left)):
-        running = np.flatnonzero(left)[: groups * compiled.LANES]
-        count = left[running].min()
-        left[running] -= count
-        slots += count * groups * compiled.LANES
-    return float(steps.sum() / (slots + left.sum()))
+def open_maze(size: int) -> Array:
+    """Return the transitions of an open maze: up, down, right, left."""
+    row, column = np.divmod(np.arange(size**2), size)
+    moves = ((-1, 0), (1, 0), (0, 1), (0, -1))
+    rows = [np.clip(row + down, 0, size - 1) for down, _ in moves]
+    columns = [np.clip(column + right, 0, size - 1) for _, right in moves]
+    return np.stack(rows, axis=1) * size + np.stack(columns, axis=1)
 
 
-@pytest.fixture(scope="module")
-def rows() -> Iterator[list[str]]:
-    """Collect the rows of the table, which is printed at the end."""
-    rows = [
-        "load   trials    k steps   lanes   kernel      C  Python  reference   ratios of kernel"
-    ]
-    yield rows
-    print("\n\nMillions of steps per second\n" + "\n".join(rows))
+def make_load(kind: str, size: int) -> tuple[tuple[Array, ...], dict[str, Any]]:
+    """Return the arrays and the options of a call in an open maze.
+
+    In a `loop` the weights are random, so that the agent circles until the time is out, as early
+    in inverse reinforcement learning; along a `path` to the goal each step is worth 1, and any
+    other -1, as late in it.
+    """
+    next_state, start, goal = open_maze(size), (size - 2) * size + 1, 3 * size + size - 3
+    weights = np.random.default_rng(1).normal(size=next_state.shape)
+    if kind == "path":
+        weights, state, steps = np.full(next_state.shape, -1.0), start, 0
+        while state != goal:
+            up = state // size > goal // size and steps % 2 == 0
+            action = 0 if up or state % size == goal % size else 2
+            weights[state, action] = 1.0
+            state, steps = int(next_state[state, action]), steps + 1
+    options = OPTIONS | {"start": start, "goal": goal, "horizon": 25 * size}
+    words = stream(np.random.SeedSequence(3))
+    return (next_state, weights, np.zeros_like(weights), words), options
 
 
-@pytest.mark.parametrize("trials", [25, 50])
-@pytest.mark.parametrize("kind", ["loop", "path", "mixed"])
-def test_speed(rows: list[str], c_learn: Learner | None, kind: str, trials: int) -> None:
-    """Kernel, C and reference compute the same bits; their speeds are shown."""
-    arrays = make_load(kind, trials)
-    learners: dict[str, Learner] = {"kernel": qlearning.learn}
-    if c_learn is not None:
-        learners["C"] = c_learn
-    learners |= {"Python": python_learn, "reference": reference_learn}
+def steps_of(learner: Learner, arrays: tuple[Array, ...], options: dict[str, Any]) -> int:
+    """Learn, and return the number of steps."""
+    return learner(*arrays, **options)[2]
+
+
+@pytest.mark.parametrize("size", [10, 20, 50, 100, 200])
+@pytest.mark.parametrize("kind", ["loop", "path"])
+def test_speed(c_learn: Learner, kind: str, size: int) -> None:
+    """Learner, C and reference compute the same bits; their speeds are shown, by size of maze."""
+    arrays, options = make_load(kind, size)
+    learners: dict[str, Learner] = {"ours": qlearning.learn, "C": c_learn}
     bits = {
-        name: [array[:1].tobytes() for array in learner(*arrays, episodes=20, **OPTIONS)]
-        for name, learner in learners.items()
-        if name != "Python"
+        name: [array.tobytes() for array in learner(*arrays, episodes=50, **options)[:2]]
+        for name, learner in (learners | {"reference": reference_learn}).items()
     }
-    assert all(x == bits["reference"] for x in bits.values())
-    episodes = {"kernel": 2000, "C": 2000, "Python": 1000, "reference": 100}
-    best, steps = speeds(learners, arrays, episodes)
-    ratios = ", ".join(f"{best['kernel'] / best[name]:.3g} {name}" for name in list(learners)[1:])
-    lengths = f"{steps.min() / 1e3:.0f}-{steps.max() / 1e3:.0f}"
-    rows.append(
-        f"{kind:6} {trials:6} {lengths:>10} {utilisation(steps):7.0%} {best['kernel']:8.0f} "
-        f"{best.get('C', np.nan):6.0f} {best['Python']:7.2f} {best['reference']:10.2f}   {ratios}"
+    assert bits["ours"] == bits["C"] == bits["reference"]
+    slow: dict[str, Learner] = {"Python": python_learn, "reference": reference_learn}
+    episodes = dict.fromkeys(learners, 20_000) | dict.fromkeys(slow, 50)
+    speeds = measure(
+        {
+            name: partial(steps_of, learner, arrays, options | {"episodes": episodes[name]})
+            for name, learner in (learners | (slow if size == 20 else {})).items()
+        }
     )
+    show(f"{kind} of {size} x {size}, M steps/s", speeds)
+
+
+@dataclass(frozen=True)
+class With:
+    """An agent that learns by another function."""
+
+    agent: Any
+    learner: Learner
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of states and number of actions."""
+        return self.agent.shape
+
+    def learn(self, weights: Array, q: Array, stream: Array) -> tuple[Array, Array, int]:
+        """Learn in the agent's maze."""
+        maze, learner = self.agent.maze, self.agent.learner
+        names = "episodes", "horizon", "beta", "gamma", "epsilon"
+        options = {name: getattr(learner, name) for name in names}
+        return self.learner(
+            maze.next_state, weights, q, stream, start=maze.start, goal=maze.goal, **options
+        )
+
+    def roll_out(self, q: Array, stream: Array) -> tuple[Episode, Array]:
+        """Follow the greedy policy as the agent does."""
+        return self.agent.roll_out(q, stream)
+
+
+def trial_steps(demos: Demos, method: str, learner: Learner) -> int:
+    """Run a few whole trials by the paper's defaults; return their steps."""
+    condition = Condition(demos, method, Params.of(incorrect="all"))
+    condition.__dict__["agent"] = With(condition.agent, learner)
+    seeds = np.random.SeedSequence(1).spawn(4)
+    return sum(condition.trial(seed=seed).steps for seed in seeds)
+
+
+@pytest.mark.parametrize("method", ["adaboost", "unified", "unified-incorrect"])
+@pytest.mark.parametrize("maze", ["open_maze", "obstacle_maze"])
+def test_whole_trials(c_learn: Learner, maze: str, method: str) -> None:
+    """The speed of whole trials of the paper, everything but the learner being the same."""
+    demos = load_demos(PROJECT / "data" / "demos" / f"{maze}.json")
+    learners: dict[str, Learner] = {"ours": qlearning.learn, "C": c_learn}
+    speeds = measure(
+        {name: partial(trial_steps, demos, method, learner) for name, learner in learners.items()}
+    )
+    show(f"{method}, {maze}", speeds)

@@ -12,7 +12,7 @@ from replication.envs.soccer.compiled import FastSoccerWorld
 from replication.envs.soccer.rules import FORWARD, SLOW, SoccerParams
 from replication.envs.soccer.world import SoccerWorld
 from replication.learning.seeds import stream
-from replication.learning.soccer import learn_trial
+from replication.learning.soccer import learn
 
 OPTIONS: dict[str, Any] = {"gamma": 0.9, "epsilon_start": 0.3, "epsilon_end": 0.05}
 SEEDS = 8
@@ -47,7 +47,7 @@ def test_decisions(mix: str) -> None:
         weights, q, beta = mixes(seed)[mix]
         words = stream(np.random.SeedSequence(seed))
         options = OPTIONS | {"episodes": 100, "beta": beta}
-        run = lambda: learn_trial(SoccerParams(), weights, q, words, **options)[2]  # noqa: B023, E731
+        run = lambda: learn(SoccerParams(), weights, q, words, **options)[2]  # noqa: B023, E731
         rates.append(clock(run))
     rates = rates[1:]  # the first one compiles
     print(f"\n{mix}: {np.mean(rates):,.0f} decisions/s ({min(rates):,.0f} to {max(rates):,.0f})")

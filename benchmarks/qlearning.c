@@ -1,6 +1,6 @@
 /* The yardstick of the benchmark: Q-learning (Eq. 1) as one would write it in C for speed.
  *
- * One trial after the other, with the semantics and the bits of replication/reference.py. The
+ * It has the semantics and the bits of replication/learning/reference.py. The
  * number of actions is a compile-time constant (-DACTIONS=4), tables are contiguous, the random
  * stream stays in registers. Of four ways to choose the greedy action this was the fastest: its
  * branches are mostly foreseen, so that the next step begins before the present one is done.
@@ -62,32 +62,26 @@ static inline int64_t choose(const double *row, uint64_t word, uint64_t threshol
     return action;
 }
 
-/* next_state [states, ACTIONS]; weights, q [trials, states, ACTIONS]; streams [trials, 4] */
-void learn(const task *k, int64_t trials, const int64_t *restrict next_state,
-           const double *restrict weights, double *restrict q, uint64_t *restrict streams,
-           int64_t *restrict steps) {
-    for (int64_t trial = 0; trial < trials; trial++) {
-        const double *w = weights + trial * k->states * ACTIONS;
-        double *table = q + trial * k->states * ACTIONS;
-        uint64_t s[4] = {streams[4 * trial], streams[4 * trial + 1], streams[4 * trial + 2],
-                         streams[4 * trial + 3]};
-        int64_t taken = 0;
-        for (int64_t episode = 0; episode < k->episodes; episode++) {
-            int64_t state = k->start;
-            for (int64_t t = 0; t < k->horizon; t++) {
-                double *row = table + state * ACTIONS;
-                const int64_t action = choose(row, draw(s), k->threshold, k->random_ties);
-                const int64_t next = next_state[state * ACTIONS + action];
-                const int goal = next == k->goal;
-                const double value = goal ? 0.0 : best_of(table + next * ACTIONS);
-                const double target = w[state * ACTIONS + action] + k->gamma * value;
-                row[action] += k->beta * (target - row[action]);
-                taken++;
-                state = next;
-                if (goal) break;
-            }
+/* next_state, weights, q [states, ACTIONS]; stream [4]; returns the number of steps */
+int64_t learn(const task *k, const int64_t *restrict next_state, const double *restrict weights,
+              double *restrict q, uint64_t *restrict stream) {
+    uint64_t s[4] = {stream[0], stream[1], stream[2], stream[3]};
+    int64_t steps = 0;
+    for (int64_t episode = 0; episode < k->episodes; episode++) {
+        int64_t state = k->start;
+        for (int64_t t = 0; t < k->horizon; t++) {
+            double *row = q + state * ACTIONS;
+            const int64_t action = choose(row, draw(s), k->threshold, k->random_ties);
+            const int64_t next = next_state[state * ACTIONS + action];
+            const int goal = next == k->goal;
+            const double value = goal ? 0.0 : best_of(q + next * ACTIONS);
+            const double target = weights[state * ACTIONS + action] + k->gamma * value;
+            row[action] += k->beta * (target - row[action]);
+            steps++;
+            state = next;
+            if (goal) break;
         }
-        for (int i = 0; i < 4; i++) streams[4 * trial + i] = s[i];
-        steps[trial] = taken;
     }
+    for (int i = 0; i < 4; i++) stream[i] = s[i];
+    return steps;
 }

@@ -15,7 +15,6 @@ from replication.demos.files import demos_document, parse_demos
 from replication.demos.model import Demos
 from replication.errors import UserError
 from replication.files import FileError, read_json, write_file
-from replication.irl import run
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
 from replication.trials.condition import Condition
@@ -156,7 +155,7 @@ def fit(
     """
     chosen = params if params is not None else Params.of(incorrect="all")
     condition = Condition(demos, method, chosen)
-    ((_, trial),) = run(condition.agent, [condition.trial(seed=trial_seeds(seed, 1)[0])])
+    trial = condition.trial(seed=trial_seeds(seed, 1)[0])
     return Fit(
         demos=demos,
         method=method,

@@ -24,7 +24,6 @@ from replication.evidence.experiments import EXPERIMENTS, condition_of
 from replication.evidence.tables import csv_text
 from replication.files import read_file, resolve
 from replication.irl import Trial
-from replication.irl.agent import Agent
 from replication.trials.compute import compute, trial_key
 from replication.trials.condition import Condition
 from replication.trials.measures import Report, factors, trial_row
@@ -111,20 +110,13 @@ def _number(row: Mapping[str, str]) -> tuple[int, int]:
 
 def _compute(wanted: Sequence[tuple[Condition, int, int]], jobs: int) -> dict[str, Trial]:
     """Compute trials, given as condition, number and root seed; return them by their keys."""
-    alike: dict[tuple[Agent, int], list[tuple[Condition, int]]] = {}
-    for condition, k, root in wanted:
-        alike.setdefault((condition.agent, root), []).append((condition, k))
-    chunks = [
-        (agent, trials[at : at + agent.batch_size], root)
-        for (agent, root), trials in alike.items()
-        for at in range(0, len(trials), agent.batch_size)
-    ]
     with workers(jobs) as n:
         # as a list: nobody may use a condition while it is sent to a worker
-        finished = joblib.Parallel(n_jobs=n)(
-            joblib.delayed(compute)(*chunk, traced=False) for chunk in chunks
+        return dict(
+            joblib.Parallel(n_jobs=n)(
+                joblib.delayed(compute)(*trial, traced=False) for trial in wanted
+            )
         )
-    return dict(pair for pairs in finished for pair in pairs)
 
 
 def declared_condition(row: Mapping[str, str]) -> Condition:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Streams = NDArray[np.uint64]
+Stream = NDArray[np.uint64]
 
 
 class Episode(NamedTuple):
@@ -41,21 +41,10 @@ class Agent(Protocol):
         """Number of states and number of actions."""
         ...
 
-    @property
-    def batch_size(self) -> int:
-        """Number of trials that are best learned in one call."""
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
+        """Return the table learned from `q` [state, action], the advanced stream and the steps."""
         ...
 
-    def learn(
-        self, weights: Array, q: Array, streams: Streams
-    ) -> tuple[Array, Streams, NDArray[np.int64]]:
-        """Return the learned tables, the advanced streams and the number of steps.
-
-        The arrays are `[trial, state, action]`, `[trial, 4]` and `[trial]`; a trial's result must
-        not depend on other trials.
-        """
-        ...
-
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
+    def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Return a greedy episode and the advanced stream."""
         ...

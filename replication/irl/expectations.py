@@ -111,4 +111,5 @@ def norm(values: NDArray[np.float64]) -> float:
     >>> norm(np.array([[3.0, 0.0], [0.0, 4.0]]))
     5.0
     """
-    return math.sqrt(math.fsum((values * values).ravel()))
+    squares = values * values
+    return math.sqrt(math.fsum(squares[squares != 0].tolist()))

@@ -1,15 +1,8 @@
-"""The loop of Algorithms 1 and 2, the same for all methods and tasks.
-
-A trial is a generator: it yields the reward weights from which Q is to be learned, and is sent the
-learned table. So the loop reads like the listings, one trial at a time, while :func:`run` collects
-the requests of many trials and lets the agent learn them together.
-"""
+"""The loop of Algorithms 1 and 2, the same for all methods and tasks."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +14,6 @@ from replication.learning.seeds import child, stream
 from replication.paper.params import Params
 
 Array = NDArray[np.float64]
-
-
-class Request(NamedTuple):
-    """What a trial asks of the agent: to learn from weights, starting with this Q and stream."""
-
-    weights: Array
-    q: Array
-    stream: NDArray[np.uint64]
-
-
-class Answer(NamedTuple):
-    """The learned table, the advanced stream and the number of learning steps."""
-
-    q: Array
-    stream: NDArray[np.uint64]
-    steps: int
 
 
 @dataclass(frozen=True)
@@ -88,7 +65,7 @@ class Trial:
         return len(self.errors) - 1
 
 
-def iterate(
+def run_trial(
     agent: Agent,
     method: Method,
     mu_e: Array,
@@ -97,13 +74,13 @@ def iterate(
     *,
     seed: np.random.SeedSequence,
     keep: bool = False,
-) -> Generator[Request, Answer, Trial]:
-    """Run one trial of Algorithm 1 or 2; the generator returns its :class:`Trial`.
+) -> Trial:
+    """Run one trial of Algorithm 1 or 2.
 
     Parameters
     ----------
     agent
-        Follows the greedy policy of Q; it is :func:`run` that lets it learn.
+        Learns Q from reward weights, and follows its greedy policy.
     method
         The weight update.
     mu_e, mu_b
@@ -148,8 +125,9 @@ def iterate(
         w, memory = method.update(w, memory, mu_e, mu_i, seen, params.update)
         if params.loop.w_norm == "unit":
             w = w / norm(w)
-        begin = np.zeros(agent.shape) if params.learner.q_start == "reset" else q
-        q, learning, n = yield Request(w, begin, learning)
+        if params.learner.q_start == "reset":
+            q = np.zeros(agent.shape)
+        q, learning, n = agent.learn(w, q, learning)  # Eq. 1
         steps += n
     snapshots = None
     if keep:
@@ -157,30 +135,6 @@ def iterate(
     return Trial(
         np.array(errors), converged, steps, w, q, tuple(episodes), np.array(values), snapshots
     )
-
-
-def run(
-    agent: Agent, trials: Iterable[Generator[Request, Answer, Trial]]
-) -> Iterator[tuple[int, Trial]]:
-    """Run trials side by side; yield the position and outcome of each as it finishes.
-
-    All trials learn in one call of `agent.learn` per iteration; the outcome of a trial does not
-    depend on the others.
-    """
-    live = dict(enumerate(trials))
-    answers: dict[int, Answer | None] = dict.fromkeys(live)
-    while live:
-        requests: dict[int, Request] = {}
-        for position, trial in list(live.items()):
-            try:
-                requests[position] = trial.send(answers[position])  # type: ignore[arg-type]
-            except StopIteration as stop:
-                del live[position]
-                yield position, stop.value
-        if requests:
-            batch = (np.stack(part) for part in zip(*requests.values(), strict=True))
-            learned = zip(requests, *agent.learn(*batch), strict=True)
-            answers = {position: Answer(q, s, int(n)) for position, q, s, n in learned}
 
 
 def _start_weights(

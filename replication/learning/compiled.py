@@ -1,36 +1,44 @@
-"""The compiled learner: Q-learning on many trials at once, and greedy roll-outs.
+"""The compiled learner: Q-learning that computes an update only if it can change a bit.
 
 :mod:`replication.learning.reference` defines what is computed, in plain Python; this module returns
-the same bits.
+the same bits. An update of Q(s, a) depends on three numbers alone, R(s, a), Q(s, a) and
+max Q(s', .), and after a while most updates write the bits that were there already.
 
-A step of Q-learning is a chain of dependent operations, so a core that runs one trial mostly waits.
-Therefore trials advance in lock step, eight to a group, each in its lane of a SIMD vector, and two
-groups take turns, so that one computes while the other waits. Numba has no vectors: `_advance`
-writes LLVM's instructions through `_Vector`, and LLVM lowers them to what the processor has. The
-last few trials, too few for a group, run one after the other in `_finish`.
+A pair (s, a) is **frozen** when an update has left the bits of Q(s, a) as they were, and **thaws**
+when those of max Q(s', .) may have changed. In between all three numbers stay the same: the reward
+is fixed, and only the pair's own updates change Q(s, a). So a further update would repeat the last
+one and write the same bits again, and it can be left out. The maximum of a state changes only in an
+update of one of its own pairs; that update then thaws all pairs that lead to the state.
+
+Every step still takes its draw and moves on, so streams and numbers of steps stay as they are. For
+that, each state has a row in a table. The entry of an action says where the row of its successor
+begins if the pair is frozen, or else THAWED. After the actions come SLOTS entries for the greedy
+choice: copies of the entries of the tied actions, each as often as the others, or all THAWED. Of k
+tied actions, a draw x in [0, 1) takes number floor(k x); slot floor(SLOTS x) belongs to the same
+one if k divides SLOTS. They are filled when the choice was computed, and become THAWED with each
+change of the state's values and each thawing of one of its pairs. So whatever entry is found, it
+leads to where a computed step would lead, and a frozen step is a draw and a look at one entry.
 
 This is one file because numba renews its cache on disk only when the file of the cached function
 changes: a compiled function must not call what is compiled from another file.
 """
 
-# Numba infers the types of compiled functions and hands an intrinsic its first argument; llvmlite
-# has no types.
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, import-untyped"
-# mypy: disable-error-code="call-arg, var-annotated"
+# Numba infers the types of compiled functions.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, var-annotated"
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
+from numpy.typing import NDArray
 
-LANES = 8
-WORTHWHILE = 5  # from this many trials on, a group is faster than one trial after the other
-STATE, TIME, LEFT, STEPS = range(4)  # a trial's progress; LEFT is the number of episodes left
-LOW, HALF = np.uint64(2**32 - 1), np.uint64(32)
+Words = NDArray[np.uint64]
+
+# Indices are unsigned: numba counts negative ones from the end, which takes time.
+ONE, HALF, LOW = np.uint64(1), np.uint64(32), np.uint64(2**32 - 1)
+SLOTS = np.uint64(12)  # divisible by 1, 2, 3 and 4
+THAWED = np.uint32(2**32 - 1)
 
 
 class Rule(NamedTuple):
@@ -39,13 +47,15 @@ class Rule(NamedTuple):
     start: int
     goal: int
     horizon: int
-    beta: float
-    gamma: float
-    threshold: int  # explore if the high half of the draw is below this
+    tolerance: float
     random_ties: bool
+    episodes: int = 0
+    beta: float = 0.0
+    gamma: float = 0.0
+    threshold: int = 0  # explore if the high half of the draw is below this
 
 
-def _compiled(function: Callable[..., Any]) -> Any:
+def cached(function: Callable[..., Any]) -> Any:
     """Compile a function, and cache the result on disk if there is a writable place for it."""
     try:
         return njit(nogil=True, cache=True)(function)
@@ -53,318 +63,197 @@ def _compiled(function: Callable[..., Any]) -> Any:
         return njit(nogil=True)(function)
 
 
-# One trial. `actions` is a tuple whose length is the number of actions: as part of the signature,
-# it lets the compiler unroll the loops over actions. A state's values and rewards lie side by side
-# in `table` [state, 2, action]: with four actions they share a cache line.
+# `actions` is a tuple whose length is the number of actions: as part of the signature, it lets the
+# compiler unroll the loops over actions. A stream is a tuple of four words.
 
 
-@_compiled
-def _draw(stream):
-    """Advance a xoshiro256++ stream in place and return its next word in two halves."""
-    s0, s1, s2, s3 = stream[0], stream[1], stream[2], stream[3]
+@cached
+def load(words):
+    """Return the stream that is stored in an array."""
+    return words[0], words[1], words[2], words[3]
+
+
+@cached
+def save(stream, words):
+    """Store a stream in an array."""
+    for i in range(4):
+        words[i] = stream[i]
+
+
+@cached
+def draw(stream):
+    """Return a xoshiro256++ stream after a draw, and the two halves of the word drawn."""
+    s0, s1, s2, s3 = stream
     word = s0 + s3
     word = (word << np.uint64(23) | word >> np.uint64(41)) + s0
     s2 ^= s0
     s3 ^= s1
-    stream[0], stream[1], stream[2] = s0 ^ s3, s1 ^ s2, s2 ^ s1 << np.uint64(17)
-    stream[3] = s3 << np.uint64(45) | s3 >> np.uint64(19)
-    return np.int64(word >> HALF), np.int64(word & LOW)
+    stream = s0 ^ s3, s1 ^ s2, s2 ^ s1 << np.uint64(17), s3 << np.uint64(45) | s3 >> np.uint64(19)
+    return stream, word >> HALF, word & LOW
 
 
-@_compiled
-def choose(actions, row, stream, threshold, random_ties):
-    """Return the action that `reference.choose` takes."""
-    high, low = _draw(stream)
-    if high < threshold:
-        return low * len(actions) >> 32
-    # Branches, unlike in a vector: a predicted action lets the next step start early.
-    best, action, ties = row[0], 0, 1
+@cached
+def largest(actions, values, state):
+    """Return the greatest value of a state; of zeros of both signs, the first."""
+    best = values[state, 0]
     for a in range(1, len(actions)):
-        if row[a] > best:
-            best, action, ties = row[a], a, 1
-        elif row[a] == best:
-            ties += 1
-    if ties > 1 and random_ties:
-        pick, seen, action = low * ties >> 32, 0, 0
-        for a in range(len(actions) - 1):
-            seen += row[a] == best
-            action += seen <= pick
+        best = values[state, a] if values[state, a] > best else best
+    return best
+
+
+@cached
+def tied(actions, values, state, tolerance, random_ties):
+    """Return what an action must be worth to count as best, and how many of those to pick from."""
+    best = largest(actions, values, state)
+    least, ties = best - tolerance * abs(best), 0
+    for a in range(len(actions)):
+        ties += values[state, a] >= least
+    return least, np.uint64(ties if random_ties else 1)
+
+
+@cached
+def pick(actions, values, state, low, least, ties):
+    """Return the action that `reference.choose` takes when it does not explore."""
+    number, seen, action = low * ties >> HALF, np.uint64(0), np.uint64(0)
+    for a in range(len(actions) - 1):
+        seen += np.uint64(values[state, a] >= least)
+        action += np.uint64(seen <= number)
     return action
 
 
-@_compiled
-def _finish(actions, stream, progress, table, successors, rule):
-    """Run one trial to its end."""
-    state, time = progress[STATE], progress[TIME]
-    while progress[LEFT]:
-        action = choose(actions, table[state, 0], stream, rule.threshold, rule.random_ties)
-        successor = successors[state, action]
-        value = 0.0
-        if successor != rule.goal:
-            value = table[successor, 0, 0]
-            for a in range(1, len(actions)):
-                other = table[successor, 0, a]
-                value = other if other > value else value
-        old = table[state, 0, action]
-        target = table[state, 1, action] + rule.gamma * value
-        table[state, 0, action] = old + rule.beta * (target - old)
-        progress[STEPS] += 1
-        state, time = successor, time + 1
-        if state == rule.goal or time == rule.horizon:
-            state, time = rule.start, 0
-            progress[LEFT] -= 1
+@cached
+def choose(actions, stream, values, state, threshold, tolerance, random_ties):
+    """Return the stream after a draw, and the action that `reference.choose` takes by it."""
+    stream, high, low = draw(stream)
+    if high < np.uint64(threshold):
+        return stream, np.int64(low * np.uint64(len(actions)) >> HALF)
+    least, ties = tied(actions, values, state, tolerance, random_ties)
+    return stream, np.int64(pick(actions, values, state, low, least, ties))
 
 
-@_compiled
-def follow(actions, stream, values, successors, rule):
+@cached
+def _width(actions):
+    """Return the length of a row: a power of 2, so that `^` can add to the place where it begins.
+
+    With 4 actions, a row of 16 entries is a cache line.
+    """
+    return np.uint64(16 if len(actions) <= 4 else 32)
+
+
+@cached
+def _predecessors(n, width, successors):
+    """Return the pairs by the states that they lead to, and where the pairs of each state begin.
+
+    A pair is its place in the table; the second array has one entry more than there are states.
+    """
+    first = np.zeros(len(successors) + 2, np.uint64)
+    pairs = np.empty(len(successors) * n, np.uint64)
+    for state in range(len(successors)):
+        for a in range(n):
+            first[successors[state, a] + 2] += ONE
+    for state in range(len(successors)):
+        first[state + 2] += first[state + 1]
+    for state in range(len(successors)):
+        for a in range(n):
+            last = successors[state, a] + 1
+            pairs[first[last]] = np.uint64(state) * width + np.uint64(a)
+            first[last] += ONE
+    return pairs, first
+
+
+@cached
+def _thaw(n, width, pair, table):
+    """Thaw a pair, and with it the greedy choice of its state."""
+    table[pair] = THAWED
+    slots = (pair ^ pair % width) + n
+    for slot in range(SLOTS):
+        table[slots + slot] = THAWED
+
+
+@cached
+def _fill(actions, values, state, table, at, least, ties):
+    """Fill the slots of a state for its greedy choice."""
+    slot = at + np.uint64(len(actions))
+    end = slot + SLOTS
+    share = SLOTS // ties if SLOTS % ties == 0 else np.uint64(0)
+    for a in range(len(actions)):
+        if values[state, a] >= least and slot < end:
+            for _ in range(share):
+                table[slot] = table[at + np.uint64(a)]
+                slot += ONE
+    while slot < end:
+        table[slot] = THAWED
+        slot += ONE
+
+
+@cached
+def learn(actions, words, values, weights, successors, rule):
+    """Run one trial and return the number of steps.
+
+    Advances, in place, the stream's `words` and `values` [state, action].
+    """
+    n, width = np.uint64(len(actions)), _width(actions)
+    start, goal = np.uint64(rule.start), np.uint64(rule.goal)
+    threshold = np.uint64(rule.threshold)
+    table = np.full(len(successors) * np.int64(width), THAWED)
+    pairs, first = _predecessors(len(actions), width, successors)
+    bits = values.view(np.int64)
+    stream, steps = load(words), 0
+    for _ in range(rule.episodes):
+        at, left = start * width, rule.horizon
+        while left:
+            while True:  # through frozen pairs; without branches, since exploring is not foreseen
+                stream, high, low = draw(stream)
+                left -= 1
+                greedy = np.uint64(high >= threshold)
+                place = (low * (n + greedy * (SLOTS - n)) >> HALF) + greedy * n
+                entry = table[at ^ place]
+                if entry == THAWED or left == 0:
+                    break
+                at = np.uint64(entry)
+            if entry != THAWED:
+                break
+            state = at // width
+            least, ties = tied(actions, values, state, rule.tolerance, rule.random_ties)
+            action = pick(actions, values, state, low, least, ties) if greedy else place
+            successor = np.uint64(successors[state, action])
+            frozen = table[at ^ action] != THAWED
+            if not frozen:
+                best, was = largest(actions, values, state), bits[state, action]
+                value = largest(actions, values, successor) if successor != goal else 0.0
+                target = weights[state, action] + rule.gamma * value
+                values[state, action] += rule.beta * (target - values[state, action])
+                frozen = bits[state, action] == was
+                now = largest(actions, values, state)
+                if frozen:
+                    table[at ^ action] = successor * width if successor != goal else THAWED
+                elif now != best or now == 0.0:  # zeros are equal, but may differ in their signs
+                    for i in range(first[state], first[state + ONE]):
+                        _thaw(n, width, pairs[i], table)
+            if frozen:
+                _fill(actions, values, state, table, at, least, ties)
+            else:
+                for slot in range(SLOTS):
+                    table[(at ^ n) + slot] = THAWED
+            if successor == goal:
+                break
+            at = successor * width
+        steps += rule.horizon - left
+    save(stream, words)
+    return steps
+
+
+@cached
+def follow(actions, words, values, successors, rule):
     """Roll out the greedy policy of `values` [state, action]; the stream advances in place."""
-    states, taken = [rule.start], [0 for _ in range(0)]
+    stream, states, taken = load(words), [rule.start], [0 for _ in range(0)]
     while len(taken) < rule.horizon:
-        action = choose(actions, values[states[-1]], stream, 0, rule.random_ties)
+        stream, action = choose(
+            actions, stream, values, states[-1], rule.threshold, rule.tolerance, rule.random_ties
+        )
         taken.append(action)
         states.append(successors[states[-1], action])
         if states[-1] == rule.goal:
             break
+    save(stream, words)
     return np.array(states), np.array(taken)
-
-
-# Eight trials to a group.
-
-WORD, FLOAT, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
-INDICES = [ir.IntType(32)(lane) for lane in range(LANES)]
-
-
-def _operator(name: str) -> Callable[["_Vector", Any], "_Vector"]:
-    """Return an operator that appends an instruction, in its form for floats where needed."""
-
-    def operator(self: "_Vector", other: Any) -> "_Vector":
-        prefix = "f" if self.value.type.element == FLOAT else ""
-        emit = getattr(self.builder, prefix + name)
-        return _Vector(self.builder, emit(self.value, self.like(other).value))
-
-    return operator
-
-
-class _Vector:
-    """A value in each lane; operators append LLVM instructions to the function being built."""
-
-    def __init__(self, builder: Any, value: Any) -> None:
-        self.builder, self.value = builder, value
-
-    def like(self, other: Any) -> "_Vector":
-        """Return a vector unchanged, and a number as a vector of this type filled with it."""
-        if isinstance(other, _Vector):
-            return other
-        return _Vector(self.builder, self.value.type(other))
-
-    __add__, __sub__, __mul__ = _operator("add"), _operator("sub"), _operator("mul")
-    __and__, __or__, __xor__ = _operator("and_"), _operator("or_"), _operator("xor")
-    __lshift__, __rshift__ = _operator("shl"), _operator("lshr")
-
-    def rotate(self, bits: int) -> "_Vector":
-        """Rotate to the left."""
-        return self << bits | self >> 64 - bits
-
-    def compare(self, sign: str, other: Any) -> "_Vector":
-        """Return the mask of ``self sign other``; integers count as signed."""
-        is_float = self.value.type.element == FLOAT
-        emit = self.builder.fcmp_ordered if is_float else self.builder.icmp_signed
-        return _Vector(self.builder, emit(sign, self.value, self.like(other).value))
-
-    def select(self, yes: Any, no: "_Vector") -> "_Vector":
-        """Return `yes` where this mask holds, and `no` elsewhere."""
-        return _Vector(self.builder, self.builder.select(self.value, no.like(yes).value, no.value))
-
-    def any(self) -> Any:
-        """Return, as a scalar, whether this mask holds in any lane."""
-        lanes = self.builder.bitcast(self.value, ir.IntType(LANES))
-        return self.builder.icmp_unsigned("!=", lanes, lanes.type(0))
-
-    def count(self) -> "_Vector":
-        """Return this mask as numbers 0 and 1."""
-        return _Vector(self.builder, self.builder.zext(self.value, ir.VectorType(WORD, LANES)))
-
-    def load(self, element: Any) -> "_Vector":
-        """Return the values stored at these addresses."""
-        kind = ir.VectorType(element, LANES)
-        masks, pointers = ir.VectorType(BIT, LANES), ir.VectorType(ir.PointerType(), LANES)
-        size = ir.IntType(32)
-        gather = cgutils.get_or_insert_function(
-            self.builder.module,
-            ir.FunctionType(kind, [pointers, size, masks, kind]),
-            f"llvm.masked.gather.v{LANES}{'f' if element == FLOAT else 'i'}64.v{LANES}p0",
-        )
-        addresses = self.builder.inttoptr(self.value, pointers)
-        value = self.builder.call(gather, [addresses, size(8), masks(1), kind(ir.Undefined)])
-        return _Vector(self.builder, value)
-
-    def store(self, values: "_Vector") -> None:
-        """Store values at these addresses, one by one: faster than a scatter, and portable."""
-        for lane in INDICES:
-            address = self.builder.extract_element(self.value, lane)
-            value = self.builder.extract_element(values.value, lane)
-            self.builder.store(value, self.builder.inttoptr(address, ir.PointerType()), align=8)
-
-
-def _spread(builder: Any, scalar: Any) -> _Vector:
-    """Return the vector with a scalar in every lane."""
-    value = ir.VectorType(scalar.type, LANES)(ir.Undefined)
-    for lane in INDICES:
-        value = builder.insert_element(value, scalar, lane)
-    return _Vector(builder, value)
-
-
-def _largest(row: list[_Vector]) -> _Vector:
-    """Return the maximum; of zeros of both signs, the first."""
-    best = row[0]
-    for value in row[1:]:
-        best = value.compare(">", best).select(value, best)
-    return best
-
-
-def _step(rule: Any, tables: _Vector, successors: _Vector, lanes: list[_Vector]) -> list[_Vector]:
-    """Append one step of one group.
-
-    The variables of the loop are the stream, the state, the time, the episodes left, and the values
-    of the state's actions, which were read when it was the successor.
-    """
-    s0, s1, s2, s3, state, time, left, *row = lanes
-    builder, actions = state.builder, len(row)
-
-    def addresses(of: _Vector) -> list[_Vector]:
-        at = tables + of * (16 * actions)
-        return [at + 8 * a for a in range(actions)]
-
-    word, t = (s0 + s3).rotate(23) + s0, s1 << 17
-    s2, s3 = s2 ^ s0, s3 ^ s1
-    stream = [s0 ^ s3, s1 ^ s2, s2 ^ t, s3.rotate(45)]
-
-    # Candidate number `pick`, counted from 0, is the first action up to which there are more.
-    explore, best = (word >> 32).compare("<", rule.threshold), _largest(row)
-    ranks = [(explore | value.compare("==", best)).count() for value in row]
-    for a in range(1, actions):
-        ranks[a] = ranks[a - 1] + ranks[a]
-    draw = (explore | rule.random_ties).select(word & 0xFFFFFFFF, word.like(0))
-    pick = draw * ranks[-1] >> 32
-    action, old = state.like(actions - 1), row[-1]
-    for a in reversed(range(actions - 1)):
-        here = ranks[a].compare(">", pick)
-        action, old = here.select(a, action), here.select(row[a], old)
-
-    successor = (successors + state * (8 * actions) + action * 8).load(WORD)
-    at = tables + state * (16 * actions) + action * 8
-    reward = (at + 8 * actions).load(FLOAT)
-
-    time = time + 1
-    at_goal, late = successor.compare("==", rule.goal), time.compare("==", rule.horizon)
-    follow = at_goal.select(rule.start, successor)
-    places = addresses(follow)
-    row = [x.load(FLOAT) for x in places]
-    value = at_goal.select(0.0, _largest(row))
-    new = old + rule.beta * (reward + rule.gamma * value - old)
-    at.store(new)
-    # The row was read before the store, which may have changed one of its places.
-    row = [x.compare("==", at).select(new, value) for x, value in zip(places, row, strict=True)]
-    # After a time-out the next state is not the one whose value is in the target. This branch comes
-    # last: LLVM would move a gather from before it to after it, which costs a fifth of the speed.
-    follow = late.select(rule.start, follow)
-    variables = [cgutils.alloca_once_value(builder, x.value) for x in row]
-    with builder.if_then(late.any(), likely=False):
-        for x, variable in zip(addresses(follow), variables, strict=True):
-            builder.store(x.load(FLOAT).value, variable)
-    row = [_Vector(builder, builder.load(x)) for x in variables]
-    done = at_goal | late
-    return [*stream, follow, done.select(0, time), left - done.count(), *row]
-
-
-@intrinsic
-def _advance(typing_context, groups, actions, streams, progress, tables, successors, rule):
-    """Let groups of trials take steps together until some trial has finished its episodes.
-
-    The tuple `groups` has an array of eight trials for each group. Returns the number of steps.
-    """
-    signature = types.int64(groups, actions, streams, progress, tables, successors, rule)
-
-    def generate(context, builder, signature, arguments):
-        def address(kind, array):
-            array = context.make_array(kind)(context, builder, array)
-            return _spread(builder, builder.ptrtoint(array.data, WORD))
-
-        all_streams, all_progress, all_tables, transitions = map(
-            address, signature.args[2:6], arguments[2:6]
-        )
-        scalars = cgutils.unpack_tuple(builder, arguments[6])
-        vectors = Rule(*(_spread(builder, x) for x in scalars))  # type: ignore[arg-type]
-        row = 16 * len(actions)  # bytes of a state's values and rewards
-        array = context.make_array(tables)(context, builder, arguments[4])
-        size = _spread(builder, builder.extract_value(array.shape, 1)) * row
-        loops = []  # of each group: where its trials are stored, and its variables
-        for group in cgutils.unpack_tuple(builder, arguments[0]):
-            first = address(groups.dtype, group)
-            offsets = _Vector(builder, first.value.type([8 * lane for lane in range(LANES)]))
-            trial = (first + offsets).load(WORD)
-            stream, state = all_streams + trial * 32, all_progress + trial * 32
-            table = all_tables + trial * size
-            record = [at + 8 * i for at, n in ((stream, 4), (state, 3)) for i in range(n)]
-            lanes = [at.load(WORD) for at in record]
-            lanes += [(table + lanes[4] * row + 8 * a).load(FLOAT) for a in range(len(actions))]
-            variables = [cgutils.alloca_once_value(builder, x.value) for x in lanes]
-            loops.append((record, table, variables))
-        count = cgutils.alloca_once_value(builder, WORD(0))
-
-        body, end = builder.append_basic_block("body"), builder.append_basic_block("end")
-        builder.branch(body)
-        builder.position_at_end(body)
-        finished = BIT(0)
-        for _, table, variables in loops:
-            lanes = [_Vector(builder, builder.load(x)) for x in variables]
-            lanes = _step(vectors, table, transitions, lanes)
-            for lane, variable in zip(lanes, variables, strict=True):
-                builder.store(lane.value, variable)
-            finished = builder.or_(finished, lanes[6].compare("==", 0).any())
-        builder.store(builder.add(builder.load(count), WORD(1)), count)
-        builder.cbranch(finished, end, body)
-        builder.position_at_end(end)
-        for record, _, variables in loops:
-            for at, variable in zip(record, variables, strict=False):
-                at.store(_Vector(builder, builder.load(variable)))
-        return builder.load(count)
-
-    return signature, generate
-
-
-# The schedule.
-
-
-@_compiled
-def count_groups(live):
-    """Return how many groups to run if so many trials are not finished."""
-    return min(2, (live + LANES - WORTHWHILE) // LANES)
-
-
-@_compiled
-def run(actions, streams, progress, tables, successors, rule):
-    """Run all trials to their end; whenever one finishes, the lanes are allotted anew.
-
-    Advances, in place, `streams` [trial, 4], `progress` [trial, 4], and the values in `tables`
-    [trial, state, 2, action].
-    """
-    while True:
-        live = np.flatnonzero(progress[:, LEFT])
-        groups = count_groups(len(live))
-        if groups == 0:
-            break
-        running = live[: groups * LANES]
-        # Spare lanes repeat the last trial. It is in the same group, so they do the same at once.
-        lanes = np.full(2 * LANES, running[-1])
-        lanes[: len(running)] = running
-        first, second = lanes[:LANES], lanes[LANES:]
-        arguments = actions, streams, progress, tables, successors, rule
-        if groups == 1:
-            count = _advance((first,), *arguments)
-        else:
-            count = _advance((first, second), *arguments)
-        for trial in running:
-            progress[trial, STEPS] += count
-    for trial in live:
-        _finish(actions, streams[trial], progress[trial], tables[trial], successors, rule)

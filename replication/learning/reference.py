@@ -30,6 +30,7 @@ def learn(
     beta: float,
     gamma: float,
     epsilon: float,
+    tolerance: float = 0.0,
     random_ties: bool = True,
 ) -> tuple[list[list[float]], list[int], int]:
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
@@ -62,7 +63,7 @@ def learn(
     for _ in range(episodes):
         state = start
         for _ in range(horizon):
-            action = choose(q[state], draw(stream), epsilon, random_ties)
+            action = choose(q[state], draw(stream), epsilon, random_ties, tolerance)
             successor = next_state[state][action]
             value = max(q[successor]) if successor != goal else 0.0
             target = weights[state][action] + gamma * value
@@ -82,6 +83,7 @@ def roll_out(
     start: int,
     goal: int,
     horizon: int,
+    tolerance: float = 0.0,
     random_ties: bool = True,
 ) -> tuple[list[int], list[int], list[int]]:
     """Follow the greedy policy of Q from ``start`` until ``goal``, for at most ``horizon`` steps.
@@ -91,14 +93,16 @@ def roll_out(
     stream, states = stream[:], [start]
     actions: list[int] = []
     while len(actions) < horizon:
-        actions.append(choose(q[states[-1]], draw(stream), 0.0, random_ties))
+        actions.append(choose(q[states[-1]], draw(stream), 0.0, random_ties, tolerance))
         states.append(next_state[states[-1]][actions[-1]])
         if states[-1] == goal:
             break
     return states, actions, stream
 
 
-def choose(row: list[float], word: int, epsilon: float, random_ties: bool) -> int:
+def choose(
+    row: list[float], word: int, epsilon: float, random_ties: bool, tolerance: float = 0.0
+) -> int:
     """Pick an action from a state's values by one 64-bit random word.
 
     The probability of exploring is ``epsilon`` to within 2**-33, and that of each of k candidates
@@ -108,8 +112,8 @@ def choose(row: list[float], word: int, epsilon: float, random_ties: bool) -> in
     if high < round(epsilon * HALF):
         candidates = list(range(len(row)))
     else:
-        best = max(row)
-        candidates = [action for action, value in enumerate(row) if value == best]
+        least = max(row) - tolerance * abs(max(row))
+        candidates = [action for action, value in enumerate(row) if value >= least]
         if not random_ties:
             candidates = candidates[:1]
     return candidates[low * len(candidates) // HALF]

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from typing import Any
 
 import numba
 import numpy as np
 
-from replication.irl.agent import Agent
-from replication.irl.loop import Trial, run
-from replication.learning.seeds import trial_seeds
+from replication.irl.loop import Trial
+from replication.learning.seeds import child
 from replication.source import source_hash
 from replication.trials.condition import Condition
 
@@ -25,36 +23,23 @@ TRACED_TRIAL = 0
 """The trial of each condition that may keep every iteration, fixed in advance (FIG5-TRIAL)."""
 
 
-def compute(
-    agent: Agent, wanted: Sequence[tuple[Condition, int]], root: int, *, traced: bool = True
-) -> list[tuple[str, Trial]]:
-    """Compute trials of conditions that share an agent, side by side.
+def compute(condition: Condition, k: int, root: int, *, traced: bool = True) -> tuple[str, Trial]:
+    """Compute trial k of a condition; return its key, too.
 
     Parameters
     ----------
-    agent
-        The agent of all conditions.
-    wanted
-        Pairs of a condition and the number of a trial.
+    condition
+        What to run.
+    k
+        Number of the trial; its seed is child k of the root seed.
     root
-        Root seed; trial k descends from its child k.
+        Root seed.
     traced
         Whether TRACED_TRIAL keeps its snapshots.
-
-    Returns
-    -------
-    list
-        Pairs of a key and a trial, in the order in which the trials finished.
     """
-    seeds = trial_seeds(root, max(k for _, k in wanted) + 1)
-    loops = [
-        condition.trial(seed=seeds[k], keep=traced and k == TRACED_TRIAL) for condition, k in wanted
-    ]
-    finished = []
-    for at, trial in run(agent, loops):
-        condition, k = wanted[at]
-        finished.append((trial_key(condition, root, k, traced=traced), trial))
-    return finished
+    seed = child(np.random.SeedSequence(root), k)
+    trial = condition.trial(seed=seed, keep=traced and k == TRACED_TRIAL)
+    return trial_key(condition, root, k, traced=traced), trial
 
 
 def trial_key(condition: Condition, root: int, k: int, *, traced: bool = True) -> str:

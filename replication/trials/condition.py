@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -14,7 +13,7 @@ from replication.envs.environment import Environment
 from replication.errors import unknown
 from replication.irl.agent import Agent
 from replication.irl.expectations import expert_expectations, visited
-from replication.irl.loop import Answer, Request, Trial, iterate
+from replication.irl.loop import Trial, run_trial
 from replication.irl.methods import Method, get_method
 from replication.paper.params import Params
 from replication.paper.register import ChoiceError
@@ -94,11 +93,9 @@ class Condition:
         """The agent that learns in the environment."""
         return make_agent(self.demos.environment, self.params)
 
-    def trial(
-        self, *, seed: np.random.SeedSequence, keep: bool = False
-    ) -> Generator[Request, Answer, Trial]:
-        """Return one trial, ready for :func:`replication.irl.run`."""
+    def trial(self, *, seed: np.random.SeedSequence, keep: bool = False) -> Trial:
+        """Run one trial, see :func:`replication.irl.run_trial`."""
         shape, gamma = self.agent.shape, self.params.learner.gamma
         mu_e = expert_expectations(self.selected.correct, gamma=gamma, shape=shape)
         mu_b = visited(self.selected.incorrect, shape=shape)
-        return iterate(self.agent, self.rule, mu_e, mu_b, self.params, seed=seed, keep=keep)
+        return run_trial(self.agent, self.rule, mu_e, mu_b, self.params, seed=seed, keep=keep)

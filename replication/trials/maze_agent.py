@@ -15,7 +15,7 @@ from replication.paper.params import Learner, Params
 from replication.paper.register import ChoiceError
 
 Array = NDArray[np.float64]
-Streams = NDArray[np.uint64]
+Stream = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,6 @@ class MazeAgent:
     maze: Maze
     learner: Learner
     rollout_ties: str
-    batch_size: int = 25  # enough to keep all lanes of the compiled learner busy
 
     def __post_init__(self) -> None:
         if self.learner.epsilon_end != self.learner.epsilon:
@@ -39,15 +38,13 @@ class MazeAgent:
         """Number of states, obstacle cells included, and number of actions."""
         return self.maze.n_states, self.maze.n_actions
 
-    def learn(
-        self, weights: Array, q: Array, streams: Streams
-    ) -> tuple[Array, Streams, NDArray[np.int64]]:
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
         """Learn by Q-learning, see :func:`replication.learning.qlearning.learn`."""
         return qlearning.learn(
             self.maze.next_state,
             weights,
             q,
-            streams,
+            stream,
             start=self.maze.start,
             goal=self.maze.goal,
             episodes=self.learner.episodes,
@@ -58,7 +55,7 @@ class MazeAgent:
             random_ties=self.learner.ties == "random",
         )
 
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
+    def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Follow the greedy policy, see :func:`replication.learning.qlearning.roll_out`."""
         states, actions, stream = qlearning.roll_out(
             self.maze.next_state,

@@ -45,9 +45,7 @@ class Results:
             return self._store.get(key, snapshots=snapshots)
         except DamagedTrialError:
             self._store.drop(key)
-            self._store.put(
-                compute(condition.agent, [(condition, k)], self.seed, traced=self._traced)
-            )
+            self._store.put([compute(condition, k, self.seed, traced=self._traced)])
             return self._store.get(key, snapshots=snapshots)
 
 

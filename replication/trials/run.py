@@ -16,7 +16,6 @@ from contextlib import contextmanager
 
 import joblib
 
-from replication.irl.agent import Agent
 from replication.progress import SCHEDULER, trial_meter
 from replication.trials.compute import compute, trial_key
 from replication.trials.condition import Condition
@@ -47,7 +46,7 @@ def run_trials(
     trials
         Trials 0 ... trials - 1 of each condition.
     store
-        Where finished trials go, a chunk at a time.
+        Where each trial goes as soon as it is finished.
     jobs
         Worker processes. Where the environment variable REPLICATION_SCHEDULER has the address of a
         Dask scheduler, its workers compute instead.
@@ -66,37 +65,28 @@ def run_trials(
     conditions = list(
         {trial_key(condition, seed, 0): condition for condition in conditions}.values()
     )
-    missing: dict[Agent, list[tuple[Condition, int]]] = {}
-    for condition in conditions:
-        keys = {k: trial_key(condition, seed, k, traced=traced) for k in range(trials)}
-        known = store.known(keys.values())
-        wanted = [(condition, k) for k, key in keys.items() if key not in known]
-        missing.setdefault(condition.agent, []).extend(wanted)
-    chunks = [
-        (agent, wanted[at : at + agent.batch_size])
-        for agent, wanted in missing.items()
-        for at in range(0, len(wanted), agent.batch_size)
-    ]
-    expected = {
-        trial_key(condition, seed, k, traced=traced)
-        for _, wanted in chunks
-        for condition, k in wanted
+    wanted = {
+        trial_key(condition, seed, k, traced=traced): (condition, k)
+        for condition in conditions
+        for k in range(trials)
     }
-    if expected:
-        with workers(jobs) as n, trial_meter(len(expected), progress) as report:
+    missing = wanted.keys() - store.known(wanted)
+    if missing:
+        with workers(jobs) as n, trial_meter(len(missing), progress) as report:
             work = joblib.Parallel(n_jobs=n, return_as="generator_unordered")(
-                joblib.delayed(compute)(agent, wanted, seed, traced=traced)
-                for agent, wanted in chunks
+                joblib.delayed(compute)(*trial, seed, traced=traced)
+                for key, trial in wanted.items()
+                if key in missing
             )
-            for finished in work:
-                if not expected.issuperset(key for key, _ in finished):
+            for key, trial in work:
+                if key not in missing:
                     raise WorkerError(
                         "a worker runs other code, or other versions of numpy or numba, than this "
                         "process: install the same commit and environment.lock there, and restart "
                         "the workers"
                     )
-                store.put(finished)
-                report(len(finished), sum(trial.steps for _, trial in finished))
+                store.put([(key, trial)])
+                report(1, trial.steps)
     return Results(store, conditions, trials, seed, traced=traced)
 
 

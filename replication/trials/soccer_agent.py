@@ -14,7 +14,7 @@ from replication.learning import soccer
 from replication.paper.params import Learner, Params
 
 Array = NDArray[np.float64]
-Streams = NDArray[np.uint64]
+Stream = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
@@ -24,35 +24,29 @@ class SoccerAgent:
     field: SoccerField
     learner: Learner
     rollout_ties: str
-    batch_size: int = 1
 
     @property
     def shape(self) -> tuple[int, int]:
         """Number of states and number of actions."""
         return self.field.n_states, self.field.n_actions
 
-    def learn(
-        self, weights: Array, q: Array, streams: Streams
-    ) -> tuple[Array, Streams, NDArray[np.int64]]:
-        """Learn by Q-learning, see :func:`replication.learning.soccer.learn_trial`."""
-        learned = [
-            soccer.learn_trial(
-                self.field.params,
-                *trial,
-                episodes=self.learner.episodes,
-                beta=self.learner.beta,
-                gamma=self.learner.gamma,
-                epsilon_start=self.learner.epsilon,
-                epsilon_end=self.learner.epsilon_end,
-                random_ties=self.learner.ties == "random",
-                bootstrap_goal=self.learner.goal_value == "bootstrap",
-            )
-            for trial in zip(weights, q, streams, strict=True)
-        ]
-        tables, words, steps = zip(*learned, strict=True)
-        return np.array(tables), np.array(words), np.array(steps)
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
+        """Learn by Q-learning, see :func:`replication.learning.soccer.learn`."""
+        return soccer.learn(
+            self.field.params,
+            weights,
+            q,
+            stream,
+            episodes=self.learner.episodes,
+            beta=self.learner.beta,
+            gamma=self.learner.gamma,
+            epsilon_start=self.learner.epsilon,
+            epsilon_end=self.learner.epsilon_end,
+            random_ties=self.learner.ties == "random",
+            bootstrap_goal=self.learner.goal_value == "bootstrap",
+        )
 
-    def roll_out(self, q: Array, stream: Streams) -> tuple[Episode, Streams]:
+    def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Follow the greedy policy, see :func:`replication.learning.soccer.roll_out`."""
         states, actions, hits, stream = soccer.roll_out(
             self.field.params, q, stream, random_ties=self.rollout_ties == "random"

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,15 +8,13 @@ import pytest
 from numpy.typing import NDArray
 
 from replication import Demos
-from replication.irl import Trial, get_method, iterate, run
+from replication.irl import Trial, get_method, run_trial
 from replication.irl.agent import Episode
 from replication.irl.expectations import feature_expectations
-from replication.irl.loop import Answer, Request
 from replication.paper.params import Params
 from replication.trials.condition import Condition
 
 Array = NDArray[np.float64]
-Loop = Generator[Request, Answer, Trial]
 GAMMA = 0.9
 NEXT = np.array([[1, 0], [2, 0], [3, 1], [4, 2], [4, 4]])  # a corridor of five: right, left
 EXPERT = np.array([0, 1, 2, 3, 4]), np.array([0, 0, 0, 0])
@@ -25,23 +22,22 @@ EXPERT = np.array([0, 1, 2, 3, 4]), np.array([0, 0, 0, 0])
 
 @dataclass
 class Corridor:
-    """Five cells in a row, solved exactly; it counts its calls."""
+    """Five cells in a row, solved exactly; it notes what each call begins from."""
 
     shape: tuple[int, int] = (5, 2)
-    batch_size: int = 1
-    calls: int = 0
+    begun: list[Array] = field(default_factory=list)
 
     def learn(
-        self, weights: Array, q: Array, streams: NDArray[np.uint64]
-    ) -> tuple[Array, NDArray[np.uint64], NDArray[np.int64]]:
+        self, weights: Array, q: Array, stream: NDArray[np.uint64]
+    ) -> tuple[Array, NDArray[np.uint64], int]:
         """Solve the corridor by value iteration."""
-        self.calls += 1
-        value = np.zeros((len(q), 5))
+        self.begun.append(q)
+        value = np.zeros(5)
         for _ in range(200):
-            q = weights + GAMMA * value[:, NEXT]
-            value = q.max(axis=2)
-            value[:, 4] = 0.0
-        return q, streams + np.uint64(1), np.full(len(q), 7)
+            q = weights + GAMMA * value[NEXT]
+            value = q.max(axis=1)
+            value[4] = 0.0
+        return q, stream + np.uint64(1), 7
 
     def roll_out(self, q: Array, stream: NDArray[np.uint64]) -> tuple[Episode, NDArray[np.uint64]]:
         """Follow the greedy policy for at most 30 steps."""
@@ -57,25 +53,23 @@ def _mu_e() -> Array:
     return feature_expectations(*EXPERT, gamma=GAMMA, shape=(5, 2))
 
 
-def _loop(
-    agent: Corridor,
+def _trial(
     method: str = "unified",
     *,
+    agent: Corridor | None = None,
     mu_e: Array | None = None,
     keep: bool = False,
     **choices: Any,
-) -> Loop:
-    mu_e = _mu_e() if mu_e is None else mu_e
-    mu_b, seed = np.zeros((5, 2), dtype=bool), np.random.SeedSequence(1)
-    params = Params.of(**choices)
-    return iterate(agent, get_method(method), mu_e, mu_b, params, seed=seed, keep=keep)
-
-
-def _trial(method: str = "unified", *, keep: bool = False, **choices: Any) -> Trial:
-    agent = Corridor()
-    ((position, trial),) = run(agent, [_loop(agent, method, keep=keep, **choices)])
-    assert position == 0
-    return trial
+) -> Trial:
+    return run_trial(
+        agent or Corridor(),
+        get_method(method),
+        _mu_e() if mu_e is None else mu_e,
+        np.zeros((5, 2), dtype=bool),
+        Params.of(**choices),
+        seed=np.random.SeedSequence(1),
+        keep=keep,
+    )
 
 
 @pytest.mark.parametrize("method", ["unified", "unified-incorrect", "adaboost"])
@@ -111,8 +105,7 @@ def test_values_are_those_of_q_on_the_experts_path(small_demos: Demos) -> None:
     condition = Condition(
         small_demos, "unified", Params.of(episodes=60, horizon=40, max_iterations=9)
     )
-    loop = condition.trial(seed=np.random.SeedSequence(1), keep=True)
-    ((_, trial),) = run(condition.agent, [loop])
+    trial = condition.trial(seed=np.random.SeedSequence(1), keep=True)
     assert trial.snapshots is not None
     path = sorted(small_demos.correct[0].states[:-1].tolist())
     assert path != small_demos.correct[0].states[:-1].tolist()
@@ -174,13 +167,9 @@ def test_weights_are_the_sum_of_the_updates() -> None:
 @pytest.mark.parametrize(("q_start", "from_zero"), [("reset", True), ("kept", False)])
 def test_q_is_reset_or_kept(q_start: str, from_zero: bool) -> None:
     """Q-START decides what the second learning call starts from."""
-    loop = _loop(Corridor(), q_start=q_start, max_iterations=2, threshold=1e-9)
-    answer, requests = None, []
-    for _ in range(2):
-        request = loop.send(answer)  # type: ignore[arg-type]
-        requests.append(request)
-        answer = (np.full((5, 2), -1.0), request.stream, 1)
-    assert (not requests[1].q.any()) == from_zero
+    agent = Corridor()
+    _trial(agent=agent, q_start=q_start, max_iterations=2, threshold=1e-9)
+    assert (not agent.begun[1].any()) == from_zero
 
 
 def test_unit_norm_normalises_every_update() -> None:
@@ -202,20 +191,10 @@ def test_random_start_weights_come_from_the_seed() -> None:
     np.testing.assert_array_equal(first, other.snapshots.weights[0])
 
 
-def test_trials_side_by_side_learn_in_one_call() -> None:
-    """Each iteration of several trials is one call of the agent, and each trial comes out alone."""
-    agent = Corridor()
-    together = dict(run(agent, [_loop(agent, name) for name in ("unified", "adaboost")]))
-    assert sorted(together) == [0, 1]
-    assert agent.calls == max(trial.iterations for trial in together.values())
-    for position, name in enumerate(("unified", "adaboost")):
-        np.testing.assert_array_equal(together[position].errors, _trial(name).errors)
-
-
 def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     """No error at the first trajectory means zero iterations and no learning."""
     agent = Corridor()
     episode, _ = agent.roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
     mu = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
-    ((_, trial),) = run(agent, [_loop(agent, mu_e=mu)])
-    assert (trial.iterations, trial.converged, agent.calls) == (0, True, 0)
+    trial = _trial(agent=agent, mu_e=mu)
+    assert (trial.iterations, trial.converged, agent.begun) == (0, True, [])

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,7 +51,9 @@ def learn_plainly(
         state, done = world.reset(), False
         while not done:
             word = reference.draw(stream)
-            action = reference.choose(q[state], word, epsilon, options["random_ties"])
+            action = reference.choose(
+                q[state], word, epsilon, options["random_ties"], options["tolerance"]
+            )
             successor, scored, timed_out = world.step(action)
             value = 0.0 if scored else max(q[successor])
             target = weights[state][action] + options["gamma"] * value
@@ -65,15 +69,16 @@ def tables(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     return rng.normal(size=(384, 5)), q, stream(np.random.SeedSequence(seed))
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 0.1])
 @pytest.mark.parametrize("random_ties", [True, False])
 @pytest.mark.parametrize("macro", ["cell", "decision"])
-def test_learning_is_the_reference(random_ties: bool, macro: str) -> None:
+def test_learning_is_the_reference(tolerance: float, random_ties: bool, macro: str) -> None:
     """Learning returns the bits of the plain loop: Q, the stream and the number of decisions."""
     params = SoccerParams(time_limit=40.0, macro=macro)
-    options = RATES | {"episodes": 12, "random_ties": random_ties}
+    options = RATES | {"episodes": 12, "tolerance": tolerance, "random_ties": random_ties}
     weights, q, stream = tables(6)
     weights[:, FORWARD] += 1.0  # so that some episodes end with a goal
-    got = soccer.learn_trial(params, weights, q, stream, **options)
+    got = soccer.learn(params, weights, q, stream, **options)
     wanted = learn_plainly(params, weights.tolist(), q.tolist(), stream.tolist(), options)
     assert got[0].tolist() == wanted[0]
     assert got[1].tolist() == wanted[1]
@@ -83,9 +88,7 @@ def test_learning_is_the_reference(random_ties: bool, macro: str) -> None:
 
 def learned() -> str:
     """Return the bits of a short learning call, as text."""
-    q, words, n = soccer.learn_trial(
-        SoccerParams(time_limit=100.0), *tables(3), episodes=8, **RATES
-    )
+    q, words, n = soccer.learn(SoccerParams(time_limit=100.0), *tables(3), episodes=8, **RATES)
     return f"{q.tobytes().hex()} {words} {n}"
 
 
@@ -102,16 +105,42 @@ def test_new_process_same_bits() -> None:
     assert done.stdout.strip() == learned()
 
 
+def test_what_is_compiled_notices_a_change_elsewhere(tmp_path: Path) -> None:
+    """Code that is kept compiled is used again, but not after a change of what it calls."""
+    package = Path(shutil.copytree(PROJECT / "replication", tmp_path / "replication"))
+
+    def run() -> str:
+        script = SCRIPT.replace("tests.learning.test_soccer", "soccer_bits")
+        done = subprocess.run(
+            [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    def kept() -> int:
+        return len(list((package / "learning" / "__pycache__").glob("soccer._compile.*learn*.nbc")))
+
+    (tmp_path / "soccer_bits.py").write_text(Path(__file__).read_text("utf-8"), "utf-8")
+    assert run() == learned()
+    before = kept()
+    assert run() == learned()
+    assert before == kept() > 0
+    changed = package / "learning" / "compiled.py"
+    text = changed.read_text("utf-8")
+    assert text.count("seen <= number") == 1
+    changed.write_text(text.replace("seen <= number", "seen < number"), "utf-8")
+    assert run() != learned()
+
+
 def test_goal_and_time_out_in_the_target(expert: Expert) -> None:
     """A goal is worth nothing afterwards; a time-out is not terminal, so its target bootstraps."""
     pairs, q, world = expert
     stream = np.arange(1, 5, dtype=np.uint64)
     rates: dict[str, Any] = {"beta": 1.0, "gamma": 0.5, "epsilon_start": 0.0, "epsilon_end": 0.0}
     zero = np.zeros((384, 5))
-    got, _, n = soccer.learn_trial(SoccerParams(), zero, q, stream, episodes=1, **rates)
+    got, _, n = soccer.learn(SoccerParams(), zero, q, stream, episodes=1, **rates)
     assert (n, got[pairs[-1]]) == (15, 0.0)
     short = SoccerParams(time_limit=world.time - 0.3)  # before the last decision
-    got, _, n = soccer.learn_trial(short, zero, q, stream, episodes=1, **rates)
+    got, _, n = soccer.learn(short, zero, q, stream, episodes=1, **rates)
     assert (n, got[pairs[-2]]) == (14, 0.5)
 
 
@@ -150,4 +179,4 @@ def test_learning_checks_its_arguments(change: dict[str, Any], message: str) -> 
         **RATES,
     }
     with pytest.raises(ValueError, match=message):
-        soccer.learn_trial(SoccerParams(), **(arguments | change))
+        soccer.learn(SoccerParams(), **(arguments | change))

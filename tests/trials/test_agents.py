@@ -89,28 +89,14 @@ def test_hits_in_soccer_are_the_decisions_with_contacts(soccer_demos: Demos, mac
     assert seen == {True, False}
 
 
-def test_soccer_trials_do_not_depend_on_each_other(soccer_demos: Demos) -> None:
-    """Two trials learned in one call have the bits of each learned alone."""
-    params = Params.of(**{**SOCCER, "episodes": 3})
-    agent = make_agent(soccer_demos.environment, params)
-    rng = np.random.default_rng(1)
-    weights, q = rng.normal(size=(2, *agent.shape)), np.zeros((2, *agent.shape))
-    streams = np.stack([stream(np.random.SeedSequence(k)) for k in range(2)])
-    together = agent.learn(weights, q, streams)
-    for k in range(2):
-        alone = agent.learn(weights[k : k + 1], q[k : k + 1], streams[k : k + 1])
-        for one, other in zip(alone, together, strict=True):
-            np.testing.assert_array_equal(one[0], other[k])
-
-
 def test_soccer_goal_value_matters(soccer_demos: Demos) -> None:
     """GOAL-VALUE bootstrap changes what is learned where a goal falls, and nothing before."""
     tables = []
     for goal_value in ("zero", "bootstrap"):
         condition = Condition(soccer_demos, "unified", Params.of(**SOCCER, goal_value=goal_value))
         (correct,) = soccer_demos.correct
-        weights = np.zeros((1, *condition.agent.shape))
-        weights[0, correct.states[:-1], correct.actions] = 1.0
-        words = stream(np.random.SeedSequence(2))[None]
+        weights = np.zeros(condition.agent.shape)
+        weights[correct.states[:-1], correct.actions] = 1.0
+        words = stream(np.random.SeedSequence(2))
         tables.append(condition.agent.learn(weights, np.zeros_like(weights), words)[0])
     assert not np.array_equal(tables[0], tables[1])

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -122,7 +121,7 @@ def test_key_is_the_same_in_another_process(condition: Condition) -> None:
 BOTH = [
     *("trials.compute", "trials.condition", "demos.model", "envs.environment"),
     *("irl.agent", "irl.expectations", "irl.loop", "paper.params", "paper.register"),
-    *("learning", "learning.seeds", "learning.compiled"),
+    *("learning", "learning.seeds", "learning.arguments", "learning.compiled"),
 ]
 MAZE = ["envs.maze", "learning.qlearning", "trials.maze_agent"]
 SOCCER = [
@@ -229,27 +228,23 @@ def test_what_computes_changes_the_keys_of_its_trials(keys: Keys, module: str) -
     assert soccer == (module not in (*MAZE, "irl.unified"))
 
 
-def test_trials_come_with_their_keys_and_bits(condition: Condition) -> None:
-    """Side by side or alone, in any order, a trial has the same bits under the same key."""
-    wanted = [(condition, 2), (replace(condition, method="unified"), 0), (condition, 0)]
-    together = dict(compute.compute(condition.agent, wanted, 7))
-    assert set(together) == {trial_key(each, 7, k) for each, k in wanted}
-    for each in wanted:
-        ((key, alone),) = compute.compute(condition.agent, [each], 7)
-        assert bits(together[key]) == bits(alone)
+def test_a_trial_comes_with_its_key_and_descends_from_its_child_of_the_root(
+    condition: Condition,
+) -> None:
+    """Trial k is the condition's trial with child k of the root seed, under its key."""
+    key, trial = compute.compute(condition, 2, 7)
+    assert key == trial_key(condition, 7, 2)
+    seed = np.random.SeedSequence(7).spawn(3)[2]
+    assert bits(trial) == bits(condition.trial(seed=seed))
 
 
 @pytest.mark.parametrize("traced", [True, False])
 def test_only_the_traced_trial_keeps_snapshots(condition: Condition, traced: bool) -> None:
     """The declared trial keeps every iteration, if asked for; its result is the same without."""
-    trials = dict(
-        compute.compute(condition.agent, [(condition, 0), (condition, 1)], 7, traced=traced)
-    )
-    first, second = (trials[trial_key(condition, 7, k, traced=traced)] for k in (0, 1))
+    first, second = (compute.compute(condition, k, 7, traced=traced)[1] for k in (0, 1))
     assert (first.snapshots is not None) == traced
     assert second.snapshots is None
-    plain: Callable[..., list[tuple[str, Trial]]] = compute.compute
-    ((_, other),) = plain(condition.agent, [(condition, 0)], 7, traced=not traced)
+    _, other = compute.compute(condition, 0, 7, traced=not traced)
     assert bits(other) == bits(first)
 
 

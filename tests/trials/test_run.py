@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,12 @@ import pytest
 
 from replication import Demos
 from replication.demos.model import content_hash
-from replication.irl import Trial, run
-from replication.irl.agent import Agent
+from replication.irl import Trial
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
 from replication.trials import compute as compute_module
-from replication.trials.compute import TRACED_TRIAL, trial_key
+from replication.trials import run as run_module
+from replication.trials.compute import TRACED_TRIAL, compute, trial_key
 from replication.trials.condition import Condition
 from replication.trials.results import Results, digest
 from replication.trials.run import WorkerError, run_trials
@@ -46,19 +45,6 @@ def _bits(results: Results) -> list[bytes]:
     ]
 
 
-@pytest.fixture
-def chunks(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Agent, int]]:
-    """Record the agent and the size of each chunk that is computed."""
-    computed: list[tuple[Agent, int]] = []
-
-    def spy(agent: Agent, loops: list[Any]) -> Iterator[tuple[int, Trial]]:
-        computed.append((agent, len(loops)))
-        return run(agent, loops)
-
-    monkeypatch.setattr(compute_module, "run", spy)
-    return computed
-
-
 @pytest.mark.parametrize("jobs", [2, 4])
 def test_workers_do_not_change_a_bit(small_demos: Demos, tmp_path: Path, jobs: int) -> None:
     """One, two and four workers give the same bits."""
@@ -72,37 +58,6 @@ def test_a_trial_does_not_depend_on_how_many_there_are(small_demos: Demos, tmp_p
     short = _run(small_demos, tmp_path / "short.sqlite", trials=2)
     long = _run(small_demos, tmp_path / "long.sqlite", trials=6)
     assert set(_bits(short)) <= set(_bits(long))
-
-
-def test_conditions_that_share_an_agent_are_computed_together(
-    small_demos: Demos, tmp_path: Path, chunks: list[tuple[Agent, int]]
-) -> None:
-    """In one chunk with those of other conditions, a trial has the bits that it has alone."""
-    conditions = [
-        *_conditions(small_demos),
-        Condition(small_demos, "unified", Params.of(**{**FEW, "max_iterations": 3})),
-    ]
-    together = run_trials(conditions, trials=3, store=Store(tmp_path / "all.sqlite"), seed=5)
-    assert [size for _, size in chunks] == [3 * len(conditions)]
-    for number, condition in enumerate(conditions):
-        path = tmp_path / f"{number}.sqlite"
-        for trials in (1, 2, 3):  # so that each is computed in a run of its own
-            alone = run_trials([condition], trials=trials, store=Store(path), seed=5)
-        together.conditions = [condition]
-        assert _bits(alone) == _bits(together)
-    assert [size for _, size in chunks[1:]] == [1] * 3 * len(conditions)
-
-
-def test_conditions_of_other_agents_are_computed_apart(
-    small_demos: Demos, store_path: Path, chunks: list[tuple[Agent, int]]
-) -> None:
-    """What learns by other parameters, or rolls out by them, shares no chunk."""
-    conditions = [
-        Condition(small_demos, "unified", Params.of(**FEW, ties=ties, rollout_ties=rollout_ties))
-        for ties, rollout_ties in (("random", "random"), ("first", "random"), ("random", "first"))
-    ]
-    run_trials(conditions, trials=2, store=Store(store_path), seed=5)
-    assert chunks == [(condition.agent, 2) for condition in conditions]
 
 
 def test_conditions_know_the_hash_of_what_they_select(small_demos: Demos) -> None:
@@ -203,16 +158,10 @@ def test_a_damaged_trial_is_computed_again(small_demos: Demos, store_path: Path)
 
 
 def test_a_killed_run_goes_on_from_the_store(
-    small_demos: Demos,
-    store_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    chunks: list[tuple[Agent, int]],
+    small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What a run that broke off had finished is not computed again."""
-    conditions = [
-        Condition(small_demos, "unified", Params.of(**FEW, ties=ties))
-        for ties in ("random", "first")
-    ]
+    condition = Condition(small_demos, "unified", Params.of(**FEW))
     put = Store.put
 
     def put_once(self: Store, trials: list[tuple[str, Trial]]) -> None:
@@ -224,11 +173,19 @@ def test_a_killed_run_goes_on_from_the_store(
 
     monkeypatch.setattr(Store, "put", put_once)
     with pytest.raises(KeyboardInterrupt):
-        run_trials(conditions, trials=2, store=Store(store_path), seed=5)
+        run_trials([condition], trials=3, store=Store(store_path), seed=5)
     monkeypatch.setattr(Store, "put", put)
-    chunks.clear()
-    run_trials(conditions, trials=2, store=Store(store_path), seed=5)
-    assert chunks == [(conditions[1].agent, 2)]
+    keys = [trial_key(condition, 5, k) for k in range(3)]
+    assert Store(store_path).known(keys) == {keys[0]}
+    computed: list[int] = []
+
+    def spy(condition: Condition, k: int, *given: Any, **options: Any) -> tuple[str, Trial]:
+        computed.append(k)
+        return compute(condition, k, *given, **options)
+
+    monkeypatch.setattr(run_module, "compute", spy)
+    run_trials([condition], trials=3, store=Store(store_path), seed=5)
+    assert computed == [1, 2]
 
 
 def test_a_worker_with_other_code_is_refused(
@@ -273,6 +230,6 @@ def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
 def test_digests_are_those_of_the_store(small_demos: Demos, store_path: Path) -> None:
     """What was computed and what is read back have one digest, so either can be verified."""
     condition = _conditions(small_demos)[1]
-    ((key, trial),) = compute_module.compute(condition.agent, [(condition, 1)], 5)
+    key, trial = compute(condition, 1, 5)
     _run(small_demos, store_path)
     assert digest(Store(store_path).get(key)) == digest(trial)
