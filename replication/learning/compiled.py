@@ -5,10 +5,11 @@ the same bits. An update of Q(s, a) depends on three numbers alone, R(s, a), Q(s
 max Q(s', .), and after a while most updates write the bits that were there already.
 
 A pair (s, a) is **frozen** when an update has left the bits of Q(s, a) as they were, and **thaws**
-when those of max Q(s', .) may have changed. In between all three numbers stay the same: the reward
-is fixed, and only the pair's own updates change Q(s, a). So a further update would repeat the last
-one and write the same bits again, and it can be left out. The maximum of a state changes only in an
-update of one of its own pairs; that update then thaws all pairs that lead to the state.
+when max Q(s', .) changes. In between all three numbers stay the same: the reward is fixed, and only
+the pair's own updates change Q(s, a). So a further update would repeat the last one and write the
+same bits again, and it can be left out. The maximum of a state changes only in an update of one of
+its own pairs; that update then thaws all pairs that lead to the state. (If it changes from 0 to -0,
+nothing follows: added to a number neither shows, and 0 and -0 as targets give the same update.)
 
 Every step still takes its draw and moves on, so streams and numbers of steps stay as they are. For
 that, each state has a row in a table. The entry of an action says where the row of its successor
@@ -31,14 +32,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
-
-Words = NDArray[np.uint64]
 
 # Indices are unsigned: numba counts negative ones from the end, which takes time.
 ONE, HALF, LOW = np.uint64(1), np.uint64(32), np.uint64(2**32 - 1)
 SLOTS = np.uint64(12)  # divisible by 1, 2, 3 and 4
 THAWED = np.uint32(2**32 - 1)
+MAX_STATES = 2**27  # so that no place in the table is THAWED
 
 
 class Rule(NamedTuple):
@@ -202,7 +201,7 @@ def learn(actions, words, values, weights, successors, rule):
     for _ in range(rule.episodes):
         at, left = start * width, rule.horizon
         while left:
-            while True:  # through frozen pairs; without branches, since exploring is not foreseen
+            while True:  # through frozen pairs, without a branch on whether to explore
                 stream, high, low = draw(stream)
                 left -= 1
                 greedy = np.uint64(high >= threshold)
@@ -211,7 +210,7 @@ def learn(actions, words, values, weights, successors, rule):
                 if entry == THAWED or left == 0:
                     break
                 at = np.uint64(entry)
-            if entry != THAWED:
+            if entry != THAWED:  # time is up
                 break
             state = at // width
             least, ties = tied(actions, values, state, rule.tolerance, rule.random_ties)
@@ -225,9 +224,9 @@ def learn(actions, words, values, weights, successors, rule):
                 values[state, action] += rule.beta * (target - values[state, action])
                 frozen = bits[state, action] == was
                 now = largest(actions, values, state)
-                if frozen:
-                    table[at ^ action] = successor * width if successor != goal else THAWED
-                elif now != best or now == 0.0:  # zeros are equal, but may differ in their signs
+                if frozen and successor != goal:  # where the episode ends
+                    table[at ^ action] = successor * width
+                if now != best:
                     for i in range(first[state], first[state + ONE]):
                         _thaw(n, width, pairs[i], table)
             if frozen:

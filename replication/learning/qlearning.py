@@ -133,6 +133,8 @@ def _successors(next_state: ArrayLike) -> Ints:
             f"next_state must hold integers [state, action] for 1 to {MAX_ACTIONS} actions, "
             f"not {table.dtype} {list(table.shape)}"
         )
+    if len(table) > compiled.MAX_STATES:
+        raise ValueError(f"next_state must have at most {compiled.MAX_STATES} states")
     if table.min(initial=0) < 0 or table.max(initial=0) >= len(table):
         raise ValueError(f"next_state must hold states from 0 to {len(table) - 1}")
     return np.ascontiguousarray(table, np.int64)

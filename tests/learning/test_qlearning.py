@@ -302,6 +302,7 @@ def test_stream_is_never_all_zero() -> None:
     [
         ({"next_state": np.zeros((25, 4))}, "next_state must hold integers"),
         ({"next_state": np.zeros((25, 17), int)}, "next_state must hold integers"),
+        ({"next_state": np.broadcast_to(0, (2**27 + 1, 1))}, "next_state must have at most"),
         ({"next_state": np.full((25, 4), 25)}, "next_state must hold states from 0 to 24"),
         ({"next_state": np.full((25, 4), -1)}, "next_state must hold states from 0 to 24"),
         ({"weights": np.zeros((1, 25, 4))}, "weights must have the shape"),
