@@ -195,7 +195,7 @@ class Checkout:
         """Run `replicate` to its end and expect an exit code; no process may survive."""
         process = self.start(*words, **options)
         said, complained = process.communicate(timeout=PATIENCE)
-        assert process.returncode == code, complained
+        assert process.returncode == code, f"{said}\n{complained}"
         assert gone(self.mark)
         return Ended(said, complained)
 
