@@ -7,6 +7,7 @@ round. Run as ``make bench``.
 """
 
 import ctypes
+import resource
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -31,7 +32,7 @@ from replication.trials.condition import Condition
 Array = NDArray[Any]
 Learner = Callable[..., tuple[Array, Array, int]]
 
-OPTIONS: dict[str, Any] = {"horizon": 500, "beta": 0.7, "gamma": 0.9, "epsilon": 0.1}
+RATES: dict[str, Any] = {"beta": 0.7, "gamma": 0.9, "epsilon": 0.1}
 ROUNDS = 5
 
 
@@ -47,11 +48,11 @@ class Task(ctypes.Structure):
 
 
 @pytest.fixture(scope="module")
-def c_learn(tmp_path_factory: pytest.TempPathFactory) -> Learner:
-    """Compile qlearning.c and wrap it."""
+def c_learn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Learner]:
+    """Compile qlearning.c and wrap it; there is nothing without a compiler."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
-        pytest.skip("there is no C compiler")
+        return {}
     library = tmp_path_factory.mktemp("c") / "qlearning.so"
     source = Path(__file__).with_name("qlearning.c")
     flags = ["-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC"]
@@ -66,13 +67,13 @@ def c_learn(tmp_path_factory: pytest.TempPathFactory) -> Learner:
         task = Task(
             states=len(next_state),
             threshold=round(options.pop("epsilon") * 2**32),
-            random_ties=options.pop("random_ties", True),
+            random_ties=1,
             **options,
         )
         arrays = [x.ctypes.data_as(ctypes.c_void_p) for x in (next_state, weights, q, stream)]
         return q, stream, function(ctypes.byref(task), *arrays)
 
-    return learn
+    return {"C": learn}
 
 
 def reference_learn(*arrays: Array, **options: Any) -> tuple[Array, Array, int]:
@@ -126,6 +127,8 @@ def show(title: str, speeds: dict[str, list[float]]) -> None:
     for name in others:
         ratios = np.array(speeds[first]) / speeds[name]
         print(f"  {ratios.min():.3g}-{ratios.max():.3g} x {name}", end="")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"  peak so far {peak:.0f} MB", end="")
 
 
 def measure(learners: dict[str, Callable[[], int]]) -> dict[str, list[float]]:
@@ -165,7 +168,7 @@ def make_load(kind: str, size: int) -> tuple[tuple[Array, ...], dict[str, Any]]:
             action = 0 if up or state % size == goal % size else 2
             weights[state, action] = 1.0
             state, steps = int(next_state[state, action]), steps + 1
-    options = OPTIONS | {"start": start, "goal": goal, "horizon": 25 * size}
+    options = RATES | {"start": start, "goal": goal, "horizon": 25 * size}
     words = stream(np.random.SeedSequence(3))
     return (next_state, weights, np.zeros_like(weights), words), options
 
@@ -177,15 +180,15 @@ def steps_of(learner: Learner, arrays: tuple[Array, ...], options: dict[str, Any
 
 @pytest.mark.parametrize("size", [10, 20, 50, 100, 200])
 @pytest.mark.parametrize("kind", ["loop", "path"])
-def test_speed(c_learn: Learner, kind: str, size: int) -> None:
+def test_speed(c_learn: dict[str, Learner], kind: str, size: int) -> None:
     """Learner, C and reference compute the same bits; their speeds are shown, by size of maze."""
     arrays, options = make_load(kind, size)
-    learners: dict[str, Learner] = {"ours": qlearning.learn, "C": c_learn}
+    learners: dict[str, Learner] = {"ours": qlearning.learn, **c_learn}
     bits = {
         name: [array.tobytes() for array in learner(*arrays, episodes=50, **options)[:2]]
         for name, learner in (learners | {"reference": reference_learn}).items()
     }
-    assert bits["ours"] == bits["C"] == bits["reference"]
+    assert all(x == bits["reference"] for x in bits.values())
     slow: dict[str, Learner] = {"Python": python_learn, "reference": reference_learn}
     episodes = dict.fromkeys(learners, 20_000) | dict.fromkeys(slow, 50)
     speeds = measure(
@@ -233,10 +236,10 @@ def trial_steps(demos: Demos, method: str, learner: Learner) -> int:
 
 @pytest.mark.parametrize("method", ["adaboost", "unified", "unified-incorrect"])
 @pytest.mark.parametrize("maze", ["open_maze", "obstacle_maze"])
-def test_whole_trials(c_learn: Learner, maze: str, method: str) -> None:
+def test_whole_trials(c_learn: dict[str, Learner], maze: str, method: str) -> None:
     """The speed of whole trials of the paper, everything but the learner being the same."""
     demos = load_demos(PROJECT / "data" / "demos" / f"{maze}.json")
-    learners: dict[str, Learner] = {"ours": qlearning.learn, "C": c_learn}
+    learners: dict[str, Learner] = {"ours": qlearning.learn, **c_learn}
     speeds = measure(
         {name: partial(trial_steps, demos, method, learner) for name, learner in learners.items()}
     )

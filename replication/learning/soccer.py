@@ -107,8 +107,8 @@ def roll_out(
     """Follow the greedy policy of ``q`` [state, action] for an episode.
 
     Returns the states, int64 [T + 1]; the actions, int64 [T]; whether the robot touched an obstacle
-    or a wall during each, bool [T]; and the stream after T draws. Raises ValueError like
-    `learn`.
+    or a wall during each, bool [T]; and the stream after T draws. Raises ValueError as
+    `learn` does.
     """
     values, words = arguments.table("q", q, _SHAPE), arguments.words(stream)
     keep: list[Any] = []
