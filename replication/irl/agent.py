@@ -41,8 +41,12 @@ class Agent(Protocol):
         """Number of states and number of actions."""
         ...
 
-    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
-        """Return the table learned from `q` [state, action], the advanced stream and the steps."""
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
+        """Return the table learned from `q` [state, action], and the advanced stream.
+
+        Behind them stand the numbers of steps and of collisions: steps that ran into a wall or an
+        obstacle.
+        """
         ...
 
     def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:

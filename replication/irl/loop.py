@@ -43,9 +43,13 @@ class Trial:
         The last reward weights and Q-table, `[state, action]`.
     episodes
         The agent's trajectory before each update and after the last one; as many as errors.
-    values
-        max_a Q(s, a) `[iteration, state]` in the states where the expert acts, in ascending order;
-        entry i is after i updates. In single precision, as it only serves reports.
+    collisions
+        Steps that ran into a wall or an obstacle while learning after each update,
+        int64 [iteration].
+    values, rewards
+        max_a Q(s, a) and max_a w(s, a), `[iteration, state]`, in the states where the expert acts,
+        in ascending order; entry i is after i updates. In single precision, as they only serve
+        reports.
     snapshots
         Every iteration, if requested.
     """
@@ -56,7 +60,9 @@ class Trial:
     weights: Array
     q: Array
     episodes: tuple[Episode, ...]
+    collisions: NDArray[np.int64]
     values: NDArray[np.float32]
+    rewards: NDArray[np.float32]
     snapshots: Snapshots | None = None
 
     @property
@@ -105,7 +111,9 @@ def run_trial(
     q = np.zeros(agent.shape)
     errors: list[float] = []
     episodes: list[Episode] = []
+    collisions: list[int] = []
     values: list[NDArray[np.float32]] = []
+    rewards: list[NDArray[np.float32]] = []
     kept: list[tuple[Array, Array]] = []
     on_path = np.flatnonzero(mu_e.any(axis=1))
     steps = 0
@@ -117,6 +125,7 @@ def run_trial(
         errors.append(norm(mu_e - mu_i))  # Eq. 6
         episodes.append(episode)
         values.append(q[on_path].max(axis=1).astype(np.float32))
+        rewards.append(w[on_path].max(axis=1).astype(np.float32))
         if keep:
             kept.append((w, q))
         converged = errors[-1] <= params.loop.threshold
@@ -127,13 +136,23 @@ def run_trial(
             w = w / norm(w)
         if params.learner.q_start == "reset":
             q = np.zeros(agent.shape)
-        q, learning, n = agent.learn(w, q, learning)  # Eq. 1
-        steps += n
+        q, learning, taken, hit = agent.learn(w, q, learning)  # Eq. 1
+        steps += taken
+        collisions.append(hit)
     snapshots = None
     if keep:
         snapshots = Snapshots(*map(np.array, zip(*kept, strict=True)))
     return Trial(
-        np.array(errors), converged, steps, w, q, tuple(episodes), np.array(values), snapshots
+        np.array(errors),
+        converged,
+        steps,
+        w,
+        q,
+        tuple(episodes),
+        np.array(collisions, np.int64),
+        np.array(values),
+        np.array(rewards),
+        snapshots,
     )
 
 

@@ -49,9 +49,22 @@ class Method:
         tuple[Array, Array],
     ]
 
+    def under(self, reading: str) -> str:
+        """Return the reading under which this method is run when others are run under `reading`.
 
-READINGS = ("printed", "updated")
-"""Both readings of Eq. 9 (choice F-INDEX); they are reported side by side everywhere."""
+        Without incorrect demonstrations nothing is set to the maximum at once, and what is left
+        of that reading is the printed one.
+        """
+        if self.readings == ("",):
+            return ""
+        return reading if reading in self.readings else "printed"
+
+
+TRACES = ("printed", "updated")
+"""Readings of Eq. 9 (choice F-INDEX): the weights move by F_i as printed, or by F_(i+1)."""
+
+READINGS = (*TRACES, "at-once")
+"""All readings: also F_i, but for marked wrong pairs, which move by their maximum at once."""
 
 METHODS: dict[str, Method] = {
     method.name: method
@@ -70,7 +83,7 @@ METHODS: dict[str, Method] = {
             name="unified",
             label="Unified, without incorrect",
             colour="#0072B2",
-            readings=READINGS,
+            readings=TRACES,
             uses_incorrect=False,
             baseline="adaboost",
             start=unified.start,

@@ -29,7 +29,8 @@ def update(
     mu_b
         Pairs that an incorrect demonstration visits; all false gives Algorithm 1.
     params
-        alpha, and whether the weights move by F_i or by F_(i+1) (choice F-INDEX).
+        alpha, and the trace by which the weights move (choice F-INDEX): F_i as printed, F_(i+1),
+        or F_i but for the pairs of line 12, which move by their maximum at once.
 
     Returns
     -------
@@ -42,7 +43,7 @@ def update(
     would overwrite line 12 at once; it is read as the `else` of line 11 (choice LINE-13).
     """
     residual = mu_e - mu_i  # Eq. 8
-    f_next = f + params.alpha * ((residual != 0) - f)  # Eq. 10
-    f_next = np.where((mu_e == 0) & (mu_i > 0) & mu_b, 1.0, f_next)  # Algorithm 2, lines 11-12
-    used = f if params.f_index == "printed" else f_next
+    wrong = (mu_e == 0) & (mu_i > 0) & mu_b  # Algorithm 2, line 11
+    f_next = np.where(wrong, 1.0, f + params.alpha * ((residual != 0) - f))  # line 12, Eq. 10
+    used = {"printed": f, "updated": f_next, "at-once": np.where(wrong, 1.0, f)}[params.f_index]
     return w + used * residual, f_next  # Eq. 9

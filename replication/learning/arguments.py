@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-LARGEST = 1e280  # far from overflow: among NaN no action is the largest
+# far from overflow: among NaN no action is the largest
+LARGEST: dict[type, float] = {np.float64: 1e280, np.float32: 1e30}
 MAX_COUNT = 2**31 - 1  # so that the number of steps fits in an int64
 
 
@@ -37,16 +38,19 @@ def tolerance(value: float) -> float:
     return float(value)
 
 
-def table(name: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a contiguous copy of a table of values or rewards."""
+def table(
+    name: str, values: ArrayLike, shape: tuple[int, ...], kind: type = np.float64
+) -> NDArray[Any]:
+    """Return a contiguous copy of a table of values or rewards, in the given type."""
     array = np.array(values, np.float64, order="C")
     if array.shape != shape:
         raise ValueError(
             f"{name} must have the shape [state, action], {list(shape)}, not {list(array.shape)}"
         )
-    if not (np.abs(array) < LARGEST).all():
-        raise ValueError(f"{name} must be finite and below {LARGEST}")
-    return array
+    largest = LARGEST[kind]
+    if not (np.abs(array) < largest).all():
+        raise ValueError(f"{name} must be finite and below {largest}")
+    return array.astype(kind)
 
 
 def words(stream: ArrayLike) -> NDArray[np.uint64]:

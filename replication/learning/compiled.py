@@ -13,8 +13,8 @@ nothing follows: added to a number neither shows, and 0 and -0 as targets give t
 
 Every step still takes its draw and moves on, so streams and numbers of steps stay as they are. For
 that, each state has a row in a table. The entry of an action says where the row of its successor
-begins if the pair is frozen, or else THAWED. After the actions come SLOTS entries for the greedy
-choice: copies of the entries of the tied actions, each as often as the others, or all THAWED. Of k
+begins if the pair is frozen, plus 1 if the pair stays where it is, or else THAWED. After the actions
+come SLOTS entries for the greedy choice: copies of the entries of the tied actions, each as often as the others, or all THAWED. Of k
 tied actions, a draw x in [0, 1) takes number floor(k x); slot floor(SLOTS x) belongs to the same
 one if k divides SLOTS. They are filled when the choice was computed, and become THAWED with each
 change of the state's values and each thawing of one of its pairs. So whatever entry is found, it
@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import intrinsic
 
 # Indices are unsigned: numba counts negative ones from the end, which takes time.
 ONE, HALF, LOW = np.uint64(1), np.uint64(32), np.uint64(2**32 - 1)
@@ -51,6 +52,7 @@ class Rule(NamedTuple):
     episodes: int = 0
     beta: float = 0.0
     gamma: float = 0.0
+    fused: bool = False
     threshold: int = 0  # explore if the high half of the draw is below this
 
 
@@ -60,6 +62,12 @@ def cached(function: Callable[..., Any]) -> Any:
         return njit(nogil=True, cache=True)(function)
     except RuntimeError:  # neither the package's folder nor the user's can be written
         return njit(nogil=True)(function)
+
+
+@intrinsic
+def fma(context, a, b, c):
+    """Return a b + c, rounded once."""
+    return a(a, b, c), lambda context, builder, signature, arguments: builder.fma(*arguments)
 
 
 # `actions` is a tuple whose length is the number of actions: as part of the signature, it lets the
@@ -186,18 +194,20 @@ def _fill(actions, values, state, table, at, least, ties):
 
 
 @cached
-def learn(actions, words, values, weights, successors, rule):
-    """Run one trial and return the number of steps.
+def learn(actions, words, values, bits, weights, successors, rule):
+    """Run one trial and return the numbers of steps and of collisions.
 
-    Advances, in place, the stream's `words` and `values` [state, action].
+    Advances, in place, the stream's `words` and `values` [state, action], whose type is that of all
+    operations, and that of `weights`. `bits` are the values as integers.
     """
     n, width = np.uint64(len(actions)), _width(actions)
     start, goal = np.uint64(rule.start), np.uint64(rule.goal)
     threshold = np.uint64(rule.threshold)
+    real = values.dtype.type
+    beta, gamma, nothing = real(rule.beta), real(rule.gamma), real(0.0)
     table = np.full(len(successors) * np.int64(width), THAWED)
     pairs, first = _predecessors(len(actions), width, successors)
-    bits = values.view(np.int64)
-    stream, steps = load(words), 0
+    stream, steps, collisions = load(words), 0, np.uint64(0)
     for _ in range(rule.episodes):
         at, left = start * width, rule.horizon
         while left:
@@ -209,23 +219,31 @@ def learn(actions, words, values, weights, successors, rule):
                 entry = table[at ^ place]
                 if entry == THAWED or left == 0:
                     break
-                at = np.uint64(entry)
+                stays = np.uint64(entry) & ONE
+                collisions += stays
+                at = np.uint64(entry) ^ stays
             if entry != THAWED:  # time is up
+                collisions += np.uint64(entry) & ONE
                 break
             state = at // width
             least, ties = tied(actions, values, state, rule.tolerance, rule.random_ties)
             action = pick(actions, values, state, low, least, ties) if greedy else place
             successor = np.uint64(successors[state, action])
+            stays = np.uint64(successor == state)
+            collisions += stays
             frozen = table[at ^ action] != THAWED
             if not frozen:
                 best, was = largest(actions, values, state), bits[state, action]
-                value = largest(actions, values, successor) if successor != goal else 0.0
-                target = weights[state, action] + rule.gamma * value
-                values[state, action] += rule.beta * (target - values[state, action])
+                value = largest(actions, values, successor) if successor != goal else nothing
+                reward, old = weights[state, action], values[state, action]
+                if rule.fused:
+                    values[state, action] = fma(beta, fma(gamma, value, reward) - old, old)
+                else:
+                    values[state, action] = old + beta * (reward + gamma * value - old)
                 frozen = bits[state, action] == was
                 now = largest(actions, values, state)
                 if frozen and successor != goal:  # where the episode ends
-                    table[at ^ action] = successor * width
+                    table[at ^ action] = successor * width + stays
                 if now != best:
                     for i in range(first[state], first[state + ONE]):
                         _thaw(n, width, pairs[i], table)
@@ -239,7 +257,7 @@ def learn(actions, words, values, weights, successors, rule):
             at = successor * width
         steps += rule.horizon - left
     save(stream, words)
-    return steps
+    return steps, collisions
 
 
 @cached

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from replication.learning import arguments, compiled
+from replication.learning import arguments, compiled, reference
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,7 +34,8 @@ def learn(
     epsilon: float,
     tolerance: float = 0.0,
     random_ties: bool = True,
-) -> tuple[Floats, Words, int]:
+    arithmetic: str = "double",
+) -> tuple[Floats, Words, int, int]:
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
 
     Parameters
@@ -59,11 +60,15 @@ def learn(
         part of its magnitude; in [0, 1).
     random_ties
         Choose at random among those, or else take the lowest action.
+    arithmetic
+        How Eq. 1 is rounded: "double", "fused" or "single", see
+        :mod:`replication.learning.reference`.
 
     Returns
     -------
-    q, stream, steps
-        The new Q, the stream after the last draw, and the number of steps taken.
+    q, stream, steps, collisions
+        The new Q, the stream after the last draw, the number of steps taken, and that of steps
+        that ended where they began.
 
     Raises
     ------
@@ -71,16 +76,21 @@ def learn(
         If a shape or a value does not fit.
     """
     successors = _successors(next_state)
-    rewards = arguments.table("weights", weights, successors.shape)
-    values, words = arguments.table("q", q, successors.shape), arguments.words(stream)
+    if arithmetic not in reference.ROUNDED:
+        raise ValueError(f"arithmetic must be {', '.join(reference.ROUNDED)}, not {arithmetic!r}")
+    kind, integers = (np.float32, np.int32) if arithmetic == "single" else (np.float64, np.int64)
+    rewards = arguments.table("weights", weights, successors.shape, kind)
+    values, words = arguments.table("q", q, successors.shape, kind), arguments.words(stream)
     rule = _rule(successors, start, goal, horizon, tolerance, random_ties)._replace(
+        fused=arithmetic == "fused",
         episodes=arguments.integer("episodes", episodes, 1),
         beta=arguments.rate("beta", beta),
         gamma=arguments.rate("gamma", gamma),
         threshold=round(arguments.rate("epsilon", epsilon) * 2**32),
     )
-    steps = compiled.learn(_actions(successors), words, values, rewards, successors, rule)
-    return values, words, steps
+    arrays = values, values.view(integers), rewards, successors
+    steps, collisions = compiled.learn(_actions(successors), words, *arrays, rule)
+    return values.astype(np.float64, copy=False), words, steps, collisions
 
 
 def roll_out(

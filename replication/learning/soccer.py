@@ -41,7 +41,7 @@ def learn(
     tolerance: float = 0.0,
     random_ties: bool = True,
     bootstrap_goal: bool = False,
-) -> tuple[Floats, Words, int]:
+) -> tuple[Floats, Words, int, int]:
     """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
 
     Parameters
@@ -65,8 +65,9 @@ def learn(
 
     Returns
     -------
-    q, stream, decisions
-        The new Q, the stream after the last draw, and the number of decisions.
+    q, stream, decisions, collisions
+        The new Q, the stream after the last draw, the number of decisions, and that of decisions
+        during which the robot touched an obstacle or a wall.
 
     Raises
     ------
@@ -93,8 +94,8 @@ def learn(
         bool(random_ties),
         bool(bootstrap_goal),
     )
-    decisions = _learn(engine, law, rewards, values, words, thresholds, rule)
-    return values, words, decisions
+    decisions, collisions = _learn(engine, law, rewards, values, words, thresholds, rule)
+    return values, words, decisions, collisions
 
 
 def roll_out(
@@ -131,14 +132,16 @@ def _compile(code: str) -> tuple[Any, Any]:
         _ = code
         beta, gamma, tolerance, random_ties, bootstrap_goal = rule
         now, clock = np.zeros(physics.N_FLOATS), np.zeros(physics.N_INTS, np.int64)
-        stream, decisions = compiled.load(words), 0
+        stream, decisions, collisions = compiled.load(words), 0, 0
         for threshold in thresholds:
             state, outcome = physics.reset(law, now, clock), physics.GOING
             while outcome == physics.GOING:
                 stream, action = compiled.choose(
                     _ACTIONS, stream, q, state, threshold, tolerance, random_ties
                 )
+                touched = clock[1:].sum()
                 successor, outcome = physics.step(engine, law, now, clock, action)
+                collisions += clock[1:].sum() > touched
                 terminal = outcome == physics.SCORED and not bootstrap_goal
                 value = 0.0 if terminal else q[successor].max()
                 target = weights[state, action] + gamma * value
@@ -146,7 +149,7 @@ def _compile(code: str) -> tuple[Any, Any]:
                 state = successor
                 decisions += 1
         compiled.save(stream, words)
-        return decisions
+        return decisions, collisions
 
     @compiled.cached
     def follow(engine, law, q, words, tolerance, random_ties):

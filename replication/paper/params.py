@@ -33,6 +33,8 @@ class Learner(Chosen):
     horizon: int = choice("HORIZON")  # steps after which an episode is cut
     q_start: str = choice("Q-START")  # whether Q is kept or reset in each iteration
     ties: str = choice("TIES")  # which of equally good actions is taken while learning
+    tie_tolerance: float = choice("TIE-TOLERANCE")  # relative difference up to which values tie
+    arithmetic: str = choice("ARITHMETIC")  # how Eq. 1 is rounded, in the mazes
     goal_value: str = choice("GOAL-VALUE")  # what the target expects beyond the goal
 
 
@@ -51,7 +53,7 @@ class Loop(Chosen):
 class Update(Chosen):
     """The weight update, Eqs. 8-10, and that of the AdaBoost-IRL reconstruction."""
 
-    f_index: str = choice("F-INDEX")  # reading of Eq. 9: F_i ("printed") or F_(i+1) ("updated")
+    f_index: str = choice("F-INDEX")  # reading of Eq. 9: by which trace the weights move
     alpha: float = choice("ALPHA")  # rate at which the trace F changes
     f_start: float = choice("F-START")  # F_0
     adaboost_rule: str = choice("ADABOOST-RULE")  # reading of AdaBoost-IRL

@@ -38,7 +38,7 @@ class MazeAgent:
         """Number of states, obstacle cells included, and number of actions."""
         return self.maze.n_states, self.maze.n_actions
 
-    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
         """Learn by Q-learning, see :func:`replication.learning.qlearning.learn`."""
         return qlearning.learn(
             self.maze.next_state,
@@ -52,7 +52,9 @@ class MazeAgent:
             beta=self.learner.beta,
             gamma=self.learner.gamma,
             epsilon=self.learner.epsilon,
+            tolerance=self.learner.tie_tolerance,
             random_ties=self.learner.ties == "random",
+            arithmetic=self.learner.arithmetic,
         )
 
     def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
@@ -64,6 +66,7 @@ class MazeAgent:
             start=self.maze.start,
             goal=self.maze.goal,
             horizon=self.learner.horizon,
+            tolerance=self.learner.tie_tolerance,
             random_ties=self.rollout_ties == "random",
         )
         return Episode(states, actions, states[1:] == states[:-1]), stream

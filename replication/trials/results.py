@@ -51,7 +51,8 @@ class Results:
 
 def digest(trial: Trial) -> str:
     """Return a hash of every bit of a trial but its snapshots, which only the traced trial has."""
-    parts: list[NDArray[Any]] = [trial.errors, trial.weights, trial.q, trial.values]
+    parts: list[NDArray[Any]] = [trial.errors, trial.weights, trial.q]
+    parts += [trial.collisions, trial.values, trial.rewards]
     parts += [part for episode in trial.episodes for part in episode]
     head = [bool(trial.converged), int(trial.steps), *(part.shape for part in parts)]
     sha256 = hashlib.sha256(repr(head).encode())

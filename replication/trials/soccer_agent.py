@@ -12,6 +12,7 @@ from replication.envs.soccer.field import SoccerField, as_soccer
 from replication.irl.agent import Episode
 from replication.learning import soccer
 from replication.paper.params import Learner, Params
+from replication.paper.register import ChoiceError
 
 Array = NDArray[np.float64]
 Stream = NDArray[np.uint64]
@@ -30,7 +31,11 @@ class SoccerAgent:
         """Number of states and number of actions."""
         return self.field.n_states, self.field.n_actions
 
-    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int]:
+    def __post_init__(self) -> None:
+        if self.learner.arithmetic != "double":
+            raise ChoiceError('in soccer all operations are rounded: set arithmetic = "double"')
+
+    def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
         """Learn by Q-learning, see :func:`replication.learning.soccer.learn`."""
         return soccer.learn(
             self.field.params,
@@ -42,6 +47,7 @@ class SoccerAgent:
             gamma=self.learner.gamma,
             epsilon_start=self.learner.epsilon,
             epsilon_end=self.learner.epsilon_end,
+            tolerance=self.learner.tie_tolerance,
             random_ties=self.learner.ties == "random",
             bootstrap_goal=self.learner.goal_value == "bootstrap",
         )
@@ -49,7 +55,11 @@ class SoccerAgent:
     def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Follow the greedy policy, see :func:`replication.learning.soccer.roll_out`."""
         states, actions, hits, stream = soccer.roll_out(
-            self.field.params, q, stream, random_ties=self.rollout_ties == "random"
+            self.field.params,
+            q,
+            stream,
+            tolerance=self.learner.tie_tolerance,
+            random_ties=self.rollout_ties == "random",
         )
         return Episode(states, actions, hits), stream
 

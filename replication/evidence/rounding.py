@@ -1,0 +1,120 @@
+"""Does rounding decide? The rule "Rounding" of the register, by which TIE-TOLERANCE was chosen."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pandas as pd
+
+from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.statistics import holm, mean_interval, sign_flip_p
+from replication.irl import METHODS
+from replication.paper.register import Value, load_choices
+from replication.trials.condition import Condition
+from replication.trials.table import Group
+
+ROOT = 13
+TRIALS = 100
+"""Root seed and number of trials of each setting, tolerance and arithmetic."""
+
+LEVEL = 0.05
+
+TASKS = ("open-maze", "obstacle-maze")
+METHOD_NAMES = ("adaboost", "unified")
+
+Setting = tuple[str, str, str]
+"""Task, method and reading of Eq. 9."""
+
+
+def settings() -> list[Setting]:
+    """Return the settings in which the iterations are compared: no incorrect demonstrations."""
+    return [
+        (task, method, reading)
+        for task in TASKS
+        for method in METHOD_NAMES
+        for reading in METHODS[method].readings
+    ]
+
+
+def variants() -> list[tuple[Value, Value]]:
+    """Return all registered tolerances, each with all arithmetics, the default ones first."""
+    tolerance, arithmetic = (load_choices()[id] for id in ("TIE-TOLERANCE", "ARITHMETIC"))
+    tolerances = sorted((tolerance.default, *tolerance.alternatives), key=float)
+    return list(product(tolerances, (arithmetic.default, *arithmetic.alternatives)))
+
+
+def conditions() -> dict[tuple[Setting, Value, Value], Condition]:
+    """Return the condition of each setting, tolerance and arithmetic."""
+    found = {}
+    for setting, (tolerance, arithmetic) in product(settings(), variants()):
+        task, method, reading = setting
+        choices = {"tie_tolerance": tolerance, "arithmetic": arithmetic}
+        found[setting, tolerance, arithmetic] = EXPERIMENTS[task].condition(
+            method, reading, **choices
+        )
+    return found
+
+
+def plan(trials: int) -> list[Group]:
+    """Return what is run: a group for each condition, with its place as the column `number`."""
+    return [
+        Group([condition], trials, {"part": "rounding", "number": number})
+        for number, condition in enumerate(conditions().values())
+    ]
+
+
+def rounding_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return how the iterations depend on arithmetic, one row a setting, tolerance and arithmetic.
+
+    Returns
+    -------
+    DataFrame
+        `difference` is the mean number of iterations more than in double precision over the same
+        seeds, with its 95 % interval `low` to `high`; `p` that of a sign-flip test, and `p_holm`
+        adjusted over all rows of the tolerance; `equal` the share of trials with the same number.
+    """
+    rows = []
+    keys = list(conditions())
+    for (setting, tolerance), own in _grouped(trials, keys).items():
+        task, method, reading = setting
+        for arithmetic, counts in own.items():
+            d = counts - own["double"]
+            low, high = mean_interval(d)
+            rows.append(
+                {
+                    "task": task,
+                    "method": method,
+                    "reading": reading,
+                    "tolerance": tolerance,
+                    "arithmetic": arithmetic,
+                    "n": len(counts),
+                    "mean": counts.mean(),
+                    "sd": counts.std(ddof=1),
+                    "difference": d.mean(),
+                    "low": float(low),
+                    "high": float(high),
+                    "equal": float((d == 0).mean()),
+                    "p": sign_flip_p(d) if arithmetic != "double" else float("nan"),
+                }
+            )
+    table = pd.DataFrame(rows)
+    table["p_holm"] = float("nan")
+    for _, part in table[table["p"].notna()].groupby("tolerance"):
+        table.loc[part.index, "p_holm"] = holm(part["p"].tolist())
+    return table
+
+
+def chosen_tolerance(table: pd.DataFrame) -> float | None:
+    """Return the least tolerance with which no difference is shown, or None."""
+    least = table.groupby("tolerance")["p_holm"].min()
+    passing = least.index[least >= LEVEL]
+    return float(min(passing)) if len(passing) else None
+
+
+def _grouped(trials, keys):  # type: ignore[no-untyped-def]
+    grouped: dict = {}
+    for number, own in trials.groupby("number"):
+        setting, tolerance, arithmetic = keys[int(number)]
+        counts = own.sort_values("trial")["iterations"].to_numpy(float)
+        grouped.setdefault((setting, tolerance), {})[arithmetic] = counts
+    return grouped
