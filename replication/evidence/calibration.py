@@ -1,64 +1,91 @@
-"""The rule "Calibrated" of the register: defaults from one published pair of numbers.
+"""The rule "Calibrated" of the register: defaults from one published pair of numbers, in two stages.
 
-Four choices that every run behind Table I must have made are not in the text. Their defaults are
-the point of a declared grid under which the unified method without incorrect demonstrations comes
-nearest to its published mean and SD on the open maze. ``choices.toml`` states the rule.
+Five choices that every run behind Table I must have made are not in the text. Their defaults are
+the values under which the unified method without incorrect demonstrations comes nearest to its
+published mean and SD on the open maze. ``choices.toml`` states the rule. Three of the choices make
+the world in which all methods learn; alpha and F_0 belong to a trace, and each trace (F_i and
+F_(i+1), choice F-INDEX) gets its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import product
 
 import numpy as np
 import pandas as pd
 
+from replication.demos.files import load_demos
 from replication.demos.maze_expert import Expert, demonstrate
-from replication.envs.maze import Maze
-from replication.evidence.statistics import mean_prediction, sd_interval, sd_prediction, summarise
+from replication.demos.model import Demos
+from replication.envs.maze import as_maze
+from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, GENERAL, NAMED
+from replication.evidence.statistics import (
+    mean_interval,
+    mean_prediction,
+    sd_interval,
+    sd_prediction,
+    summarise,
+)
+from replication.files import resolve
+from replication.irl.methods import TRACES
 from replication.paper.params import Params
 from replication.paper.published import TABLE_1, Published
 from replication.paper.register import Value, load_choices
 from replication.trials.condition import Condition
 from replication.trials.table import Group
 
-CALIBRATED = ("DEMO-SHAPE", "ALPHA", "F-START", "TIES")
-"""The choices that were calibrated."""
+WORLD = ("DEMO-SHAPE", "TIES", "Q-START")
+TRACE = ("ALPHA", "F-START")
+"""The choices that were calibrated: for all readings together, and for each trace."""
 
-ROOT = 1
-TRIALS = 30
-"""Root seed and number of trials of each point."""
+SCREEN_TRIALS, FINAL_TRIALS = 10, 200
+"""Trials of each point in the first stage, and of each finalist in the second, from fresh seeds."""
+
+WORLDS, POINTS = 5, 4
+"""How many worlds go on to the second stage, and how many points of each trace in each of them."""
+
+PLAINEST = (4, "random", "kept", 0.5, 0.5)
+"""The point that is taken if no finalist fits: the middle of each range, nothing preferred."""
 
 PAIR = TABLE_1["unified"]
 """The published numbers that were used up by the calibration."""
 
 Point = tuple[Value, ...]
-"""A value for each of CALIBRATED."""
+"""A value for each choice of WORLD and TRACE, and the trace (F-INDEX)."""
 
 
-def grid() -> list[Point]:
-    """Return all points: every registered value but the ablation ALPHA = 0."""
-    choices = [load_choices()[id] for id in CALIBRATED]
-    values = [(choice.default, *choice.alternatives) for choice in choices]
-    return list(product(*(sorted(v for v in accepted if v != 0) for accepted in values)))
+@cache
+def points() -> list[Point]:
+    """Return all points: every registered value but the ablation ALPHA = 0, under each trace."""
+    choices = [load_choices()[id] for id in (*WORLD, *TRACE)]
+    values = [sorted({choice.default, *choice.alternatives} - {0}, key=str) for choice in choices]
+    return list(product(*values, TRACES))
 
 
-def chosen() -> Point:
-    """Return the point of the register's defaults."""
-    return tuple(load_choices()[id].default for id in CALIBRATED)
+def chosen(trace: str) -> Point:
+    """Return the point of the register's defaults under a trace."""
+    values = [load_choices()[id].default for id in WORLD]
+    fields = {"ALPHA": "alpha", "F-START": "f_start"}
+    own = CALIBRATED.get(trace, {})
+    values += [own.get(fields[id], load_choices()[id].default) for id in TRACE]
+    return (*values, trace)
 
 
-def grid_conditions(maze: Maze) -> dict[Point, Condition]:
-    """Return the condition of each point: the unified method without incorrect demonstrations."""
-    legs = {
-        leg: demonstrate("open-maze", maze, params=Expert(leg=int(leg)))
-        for leg in {leg for leg, *_ in grid()}
-    }
-    return {
-        (leg, alpha, f_start, ties): Condition(
-            legs[leg], "unified", Params.of(alpha=alpha, f_start=f_start, ties=ties)
-        )
-        for leg, alpha, f_start, ties in grid()
-    }
+@cache
+def _demos(leg: int) -> Demos:
+    template = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    return demonstrate("open-maze", as_maze(template.environment), params=Expert(leg=leg))
+
+
+def condition(point: Point, method: str = "unified", set: str = "none") -> Condition:
+    """Return the condition of a point."""
+    leg, ties, q_start, alpha, f_start, trace = point
+    params = Params.of(
+        ties=ties, q_start=q_start, alpha=alpha, f_start=f_start, f_index=trace, incorrect=set
+    )
+    return Condition(_demos(int(leg)), method, params)
 
 
 def kl_divergence(mean: float, sd: float, published: Published) -> float:
@@ -80,30 +107,77 @@ def kl_divergence(mean: float, sd: float, published: Published) -> float:
     return float(np.log(sd / published.sd) + spread / (2 * sd**2) - 0.5)
 
 
-def plan(maze: Maze, trials: int) -> list[Group]:
-    """Return what is run: a group for each point, with "grid" and its place as columns."""
-    return [
-        Group([condition], trials, {"part": "grid", "number": number})
-        for number, condition in enumerate(grid_conditions(maze).values())
-    ]
+# --- what is run ---------------------------------------------------------------------------------
+
+SETS = (NAMED, GENERAL)
 
 
-def calibration_table(trials: pd.DataFrame) -> pd.DataFrame:
-    """Return one row a point, the nearest first, with its mean, SD and divergence."""
+def declared_condition(part: str, number: int) -> Condition:
+    """Return the condition of a row of the table of trials, by its stage and number."""
+    place, rest = divmod(number, len(SETS) if part == "fits" else 1)
+    if part == "fits":
+        return condition(points()[place], "unified-incorrect", SETS[rest])
+    return condition(points()[place])
+
+
+def stages(
+    *, screen_trials: int = SCREEN_TRIALS, final_trials: int = FINAL_TRIALS
+) -> list[Callable[[pd.DataFrame], list[Group]]]:
+    """Return what is run in each stage, given the trials of those before.
+
+    First all points, then the finalists, then what incorrect demonstrations save at each of the
+    finalists that fits.
+    """
+
+    def group(part: str, number: int, trials: int) -> Group:
+        labels = {"part": part, "number": number}
+        return Group([declared_condition(part, number)], trials, labels)
+
+    def screen(_: pd.DataFrame) -> list[Group]:
+        return [group("screen", number, screen_trials) for number in range(len(points()))]
+
+    def final(trials: pd.DataFrame) -> list[Group]:
+        table = calibration_table(trials, "screen")
+        return [group("final", points().index(p), final_trials) for p in finalists(table)]
+
+    def fits(trials: pd.DataFrame) -> list[Group]:
+        table = calibration_table(trials, "final")
+        fitting = [points().index(_point(row)) for _, row in table[table["fits"]].iterrows()]
+        numbers = [len(SETS) * place + rest for place in fitting for rest in range(len(SETS))]
+        return [group("fits", number, final_trials) for number in numbers]
+
+    return [screen, final, fits]
+
+
+def calibration_table(trials: pd.DataFrame, stage: str) -> pd.DataFrame:
+    """Return one row a point of a stage, the nearest first, with its mean, SD and divergence.
+
+    `fits` says whether mean and SD both lie where those of as many trials from the published
+    distribution would, each with 95 %.
+    """
     rows = []
-    points = grid()
-    for number, own in trials.groupby("number"):
-        ours = summarise(own["iterations"], own["converged"])
+    for number, own in trials[trials["part"] == stage].groupby("number"):
+        counts = own["iterations"].to_numpy(float)
+        ours = summarise(counts, own["converged"])
+        mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, ours.n)
+        sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
+        point = points()[int(number)]
+        fits = mean_from <= ours.mean <= mean_to and sd_from <= ours.sd <= sd_to
+        sd_low, sd_high = sd_interval(counts)
         rows.append(
             {
-                **dict(zip(CALIBRATED, points[number], strict=True)),
+                **dict(zip((*WORLD, *TRACE, "F-INDEX"), point, strict=True)),
                 "n": ours.n,
                 "capped": ours.capped,
                 "mean": ours.mean,
+                "low": ours.low,
+                "high": ours.high,
                 "sd": ours.sd,
-                "median": ours.median,
+                "sd_low": sd_low,
+                "sd_high": sd_high,
                 "kl_divergence": kl_divergence(ours.mean, ours.sd, PAIR),
-                "default": points[number] == chosen(),
+                "fits": bool(fits),
+                "default": point == chosen(str(point[-1])),
                 "paper_mean": PAIR.mean,
                 "paper_sd": PAIR.sd,
             }
@@ -111,38 +185,103 @@ def calibration_table(trials: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows).sort_values("kl_divergence", kind="stable", ignore_index=True)
 
 
-def check_table(grid_trials: pd.DataFrame, trials: pd.DataFrame) -> pd.DataFrame:
-    """Return how near the chosen point comes to the pair: in the grid, and in new trials.
+def worlds(table: pd.DataFrame) -> pd.Series:
+    """Return the divergence of each world, the nearest first: the sum of the traces' least ones."""
+    least = table.groupby([*WORLD, "F-INDEX"])["kl_divergence"].min().unstack("F-INDEX")
+    return least.reindex(columns=list(TRACES)).sum(axis=1, skipna=False).sort_values(kind="stable")
 
-    One row for its trials in the grid, and one for the judged trials of the open maze
-    under each reading of Eq. 9: mean and SD with their intervals, and where both would lie if the
-    trials came from the published distribution, as for the claims about published numbers.
-    """
-    new = trials[trials["method"] == "unified"].groupby("reading", sort=False)["iterations"]
-    own = grid_trials[grid_trials["number"] == grid().index(chosen())]
-    runs = [("grid", "printed", own["iterations"].to_numpy(float))]
-    runs += [("new", str(reading), rows.to_numpy(float)) for reading, rows in new]
+
+def finalists(table: pd.DataFrame) -> list[Point]:
+    """Return the points that go on to the second stage, given the table of the first."""
+    found: list[Point] = []
+    for world in worlds(table).index[:WORLDS]:
+        own = table[(table[list(WORLD)] == world).all(axis=1)]
+        for trace in TRACES:
+            best = own[own["F-INDEX"] == trace].head(POINTS)
+            found += [_point(row) for _, row in best.iterrows()]
+    return found
+
+
+def nearest(table: pd.DataFrame) -> dict[str, Point]:
+    """Return the point of each trace that the rule takes, given the table of the second stage."""
+    if not table["fits"].any():
+        return {trace: (*PLAINEST, trace) for trace in TRACES}
+    world = worlds(table).index[0]
+    own = table[(table[list(WORLD)] == world).all(axis=1)]
+    return {trace: _point(own[own["F-INDEX"] == trace].iloc[0]) for trace in TRACES}
+
+
+def _point(row: pd.Series) -> Point:
+    values = tuple(row[[*WORLD, *TRACE, "F-INDEX"]])
+    return next(point for point in points() if point == values)
+
+
+def savings_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return what each set of incorrect demonstrations saves at every finalist that fits."""
     rows = []
-    for source, reading, counts in runs:
-        ours = summarise(counts, np.ones(len(counts)))
-        sd_low, sd_high = sd_interval(counts)
-        mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, ours.n)
-        sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
+    final = trials[trials["part"] == "final"]
+    for number, own in trials[trials["part"] == "fits"].groupby("number"):
+        place, rest = divmod(int(number), len(SETS))
+        base = final[final["number"] == place].set_index("trial")["iterations"]
+        saved = (base - own.set_index("trial")["iterations"]).to_numpy(float)
+        low, high = mean_interval(saved)
         rows.append(
             {
-                "trials": source,
-                "reading": reading,
-                "n": ours.n,
-                "mean": ours.mean,
-                "low": ours.low,
-                "high": ours.high,
-                "predicted_low": mean_from,
-                "predicted_high": mean_to,
-                "sd": ours.sd,
-                "sd_low": sd_low,
-                "sd_high": sd_high,
-                "sd_predicted_low": sd_from,
-                "sd_predicted_high": sd_to,
+                **dict(zip((*WORLD, *TRACE, "F-INDEX"), points()[place], strict=True)),
+                "set": SETS[rest],
+                "n": len(saved),
+                "saved": saved.mean(),
+                "low": float(low),
+                "high": float(high),
             }
         )
     return pd.DataFrame(rows)
+
+
+def check_table(trials: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
+    """Return how near the chosen points come to the pair: in the calibration, and in the judging.
+
+    One row for each trace and source of trials: mean and SD with their intervals, and where both
+    would lie if the trials came from the published distribution.
+    """
+    rows = []
+    for trace in TRACES:
+        number = points().index(chosen(trace))
+        ours = trials[(trials["part"] == "final") & (trials["number"] == number)]
+        new = judged[(judged["method"] == "unified") & (judged["reading"] == trace)]
+        for source, own in (("calibration", ours), ("judging", new)):
+            if own.empty:
+                continue
+            counts = own["iterations"].to_numpy(float)
+            summary = summarise(counts, own["converged"])
+            sd_low, sd_high = sd_interval(counts)
+            mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, summary.n)
+            sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
+            rows.append(
+                {
+                    "trials": source,
+                    "reading": trace,
+                    "n": summary.n,
+                    "mean": summary.mean,
+                    "low": summary.low,
+                    "high": summary.high,
+                    "predicted_low": mean_from,
+                    "predicted_high": mean_to,
+                    "sd": summary.sd,
+                    "sd_low": sd_low,
+                    "sd_high": sd_high,
+                    "sd_predicted_low": sd_from,
+                    "sd_predicted_high": sd_to,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def rule_follows(table: pd.DataFrame) -> bool:
+    """Return whether the register's defaults are what the rule takes from the second stage."""
+    return nearest(table) == {trace: chosen(trace) for trace in TRACES}
+
+
+def fitting(table: pd.DataFrame) -> Sequence[Point]:
+    """Return the finalists that fit."""
+    return [_point(row) for _, row in table[table["fits"]].iterrows()]

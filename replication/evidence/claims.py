@@ -12,59 +12,60 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from replication.errors import UserError, unknown
+from replication.evidence.experiments import EXPERIMENTS, NONE
 from replication.evidence.statistics import CONFIDENCE
 from replication.files import read_text
-from replication.irl import METHODS
+from replication.irl import METHODS, get_method
 from replication.paper.published import Published
+from replication.source import bare_source
 
 FILE = Path(__file__).with_name("claims.toml")
 
+DECIDING = ("verdicts.py", "statistics.py")
+"""The modules that decide, beside the file: they are frozen with it."""
+
 TaskName = Literal["open-maze", "obstacle-maze", "soccer"]
-Reading = Literal["printed", "updated"]
-Measure = Literal["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
-MEASURES: tuple[str, ...] = get_args(Measure)
+Measure = Literal[
+    "iterations", "converged", "early_collisions", "early_errors", "q_growth", "reward_growth"
+]
 Statistic = Literal[
-    "mean-difference",
-    "sd-ratio",
-    "mean",
-    "share",
-    "published-mean",
-    "published-sd",
-    "published-run",
+    "saved", "sd-ratio", "mean", "share", "published-mean", "published-sd", "published-run"
 ]
 
-TESTS = {"mean-difference": "signed-rank", "mean": "signed-rank", "sd-ratio": "brown-forsythe"}
-"""The test that stands beside a statistic's interval; the others have none."""
+TESTED = ("saved", "sd-ratio", "mean")
+"""The statistics with a test; those of "published" numbers and of shares have none."""
 
 LABELS = {
     "FASTER": "faster than AdaBoost-IRL",
     "STEADIER": "steadier than AdaBoost-IRL",
+    "FASTER-WITH": "with incorrect: faster than AdaBoost-IRL",
     "SAVES-OPEN": "saves iterations, open maze",
     "SAVES-OBSTACLES": "saves iterations, obstacles",
     "SAVES-SOCCER": "saves iterations, soccer",
+    "AVOIDS-OPEN": "collides less at first, open maze",
+    "AVOIDS-OBSTACLES": "collides less at first, obstacles",
+    "AVOIDS-SOCCER": "collides less at first, soccer",
+    "ERRS-OPEN": "errs less at first, open maze",
+    "ERRS-OBSTACLES": "errs less at first, obstacles",
+    "ERRS-SOCCER": "errs less at first, soccer",
     "ZERO-OPEN": "error falls to zero, open maze",
     "ZERO-OBSTACLES": "error falls to zero, obstacles",
     "ZERO-SOCCER": "error falls to zero, soccer",
-    "AVOIDS-OPEN": "errs less at first, open maze",
-    "AVOIDS-OBSTACLES": "errs less at first, obstacles",
-    "AVOIDS-SOCCER": "errs less at first, soccer",
-    "Q-GROWS": "Q grows along the path",
-    "Q-TO-GOAL": "Q grows toward the goal",
-    "REWARD-TO-GOAL": "reward grows toward the goal",
+    "Q-GROWS": "Q grows with time",
+    "REWARD-GROWS": "reward grows with time",
 }
-"""What each comparative claim says, in a few words, and on which task; a claim may have none."""
+"""What each claim that is not a published number says, in a few words, and on which task."""
 
 EVIDENCE = {
     ("open-maze", "iterations"): "open_maze/contrasts",
     ("open-maze", "converged"): "open_maze/fig05",
     ("open-maze", "q_growth"): "open_maze/fig07",
-    ("open-maze", "q_slope"): "open_maze/fig07",
-    ("open-maze", "reward_slope"): "open_maze/fig07",
+    ("open-maze", "reward_growth"): "open_maze/fig07",
     ("obstacle-maze", "iterations"): "obstacle_maze/contrasts",
     ("obstacle-maze", "converged"): "obstacle_maze/fig09_errors",
     ("soccer", "iterations"): "soccer/contrasts",
@@ -113,8 +114,9 @@ class Strict(BaseModel):
 class Claim(Strict):
     """One claim of the paper; ``claims.toml`` explains the fields.
 
-    `paper` has mean, SD and number of trials by method; `used` gives the reason for no verdict, by
-    reading of Eq. 9 or for all of them.
+    `paper` has mean, SD and number of trials by method. `margin` is the smallest effect of
+    interest, or `fraction` that as a share of y's mean; without either it follows from `paper`.
+    `used` is the reason why a number gets no verdict.
     """
 
     id: str
@@ -125,33 +127,40 @@ class Claim(Strict):
     statistic: Statistic
     x: str
     y: str = ""
-    direction: Literal["less", "greater", "inside"] = "inside"
-    margin: float = 0.0
-    test: Literal["signed-rank", "brown-forsythe", "none"] = "none"
+    margin: float | None = None
+    fraction: Annotated[float, Field(gt=0, lt=1)] | None = None
+    prediction: str = ""
     note: str = ""
     paper: Mapping[str, tuple[float, float, int]] = {}
-    used: Mapping[Literal["printed", "updated", "all"], str] = {}
+    used: str = ""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        published = self.statistic.startswith("published")
         for method in (self.x, *filter(None, [self.y]), *self.paper):
             if method not in METHODS:
                 raise ValueError(f"there is no method {method!r}; known: {', '.join(METHODS)}")
-        wanted = TESTS.get(self.statistic, "none")
-        if self.test != wanted:
-            raise ValueError(f"the test of {self.statistic!r} is {wanted!r}, not {self.test!r}")
-        if (self.direction == "inside") != published:
-            raise ValueError(f"{self.direction!r} does not go with {self.statistic!r}")
-        if published and self.x not in self.paper:
+        if self.is_published and self.x not in self.paper:
             raise ValueError(f"paper.{self.x} is missing")
-        if self.statistic in ("mean-difference", "sd-ratio") and not self.y:
+        if self.statistic in ("saved", "sd-ratio", "share") and not self.y:
             raise ValueError(f"{self.statistic!r} needs y")
         if self.x == self.y:
             raise ValueError(f"x and y are both {self.x!r}; name two methods")
         if self.paper and self.y and not {self.x, self.y} <= set(self.paper):
             raise ValueError(f"paper has to have both {self.x!r} and {self.y!r}, or neither")
+        if bool(self.used) == bool(self.prediction):
+            raise ValueError("needs a prediction, or a reason why it is not judged (used)")
         return self
+
+    @property
+    def is_published(self) -> bool:
+        """Whether the claim is a published number itself."""
+        return self.statistic.startswith("published")
+
+    def cells(self) -> list[tuple[str, str]]:
+        """Return the cells in which it is judged: reading of Eq. 9, and set of demonstrations."""
+        method = get_method(self.x)
+        sets = EXPERIMENTS[self.task].sets if method.uses_incorrect else (NONE,)
+        return [(reading, set) for set in sets for reading in method.readings]
 
     def published(self, method: str) -> Published:
         """Return the published numbers of a method."""
@@ -163,8 +172,8 @@ class Claim(Strict):
         if not self.paper:
             return math.nan
         mean, sd, _ = self.paper[self.x]
-        if self.statistic == "mean-difference":
-            return mean - self.paper[self.y][0]
+        if self.statistic == "saved":
+            return self.paper[self.y][0] - mean
         if self.statistic == "sd-ratio":
             return sd / self.paper[self.y][1]
         return sd if self.statistic == "published-sd" else mean
@@ -177,7 +186,6 @@ class Judging(Strict):
     fewest: Annotated[int, Field(ge=2)]
     confidence: float
     level: Annotated[float, Field(gt=0, lt=1)]
-    readings: tuple[Reading, ...]
     trials: Mapping[TaskName, Annotated[int, Field(ge=2)]]
 
     @model_validator(mode="after")
@@ -190,18 +198,19 @@ class Judging(Strict):
         return self
 
 
-class Explored(Strict):
-    """Runs whose outcome was known when the criteria were frozen."""
+class Known(Strict):
+    """What was known when the criteria were frozen: runs, by their root seeds."""
 
     root_seeds: tuple[int, ...]
     what: str
 
 
 class Claims(Strict):
-    """The whole file: the judging run, the claims, and what was run before."""
+    """The whole file: the judging run, the claims, and what was known before."""
 
+    version: Literal[2]
     judging: Judging
-    explored: tuple[Explored, ...]
+    known: tuple[Known, ...]
     claim: tuple[Claim, ...]
 
     @model_validator(mode="after")
@@ -213,8 +222,8 @@ class Claims(Strict):
             if claim.task not in self.judging.trials:
                 raise ValueError(f"judging.trials has no {claim.task!r}")
         seed = self.judging.root_seed
-        if any(seed in run.root_seeds for run in self.explored):
-            raise ValueError(f"root seed {seed} was explored; judge by one that never was")
+        if any(seed in run.root_seeds for run in self.known):
+            raise ValueError(f"root seed {seed} was used before; judge by one that never was")
         return self
 
     def by_id(self, id: str) -> Claim:
@@ -266,8 +275,13 @@ def parse_claims(text: str) -> Claims:
 
 
 def criteria_hash() -> str:
-    """Return the hash of the frozen file, which is written beside every verdict."""
-    return canonical_hash(read_text(FILE))
+    """Return the hash of the criteria, which is written beside every verdict.
+
+    It covers the values of the file, and the source that decides.
+    """
+    deciding = (bare_source(read_text(FILE.with_name(name))) for name in DECIDING)
+    content = "\n".join([canonical_hash(read_text(FILE)), *deciding])
+    return hashlib.sha256(content.encode()).hexdigest()
 
 
 def canonical_hash(text: str) -> str:

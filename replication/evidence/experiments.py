@@ -12,12 +12,18 @@ from replication.demos.files import load_demos
 from replication.demos.model import Demos
 from replication.errors import unknown
 from replication.files import resolve
-from replication.irl import METHODS, READINGS, get_method
+from replication.irl import METHODS, get_method
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
 from replication.paper.register import ChoiceError, load_choices
 from replication.trials.condition import Condition
 from replication.trials.measures import factors
+
+NAMED = "hit+detour"
+"""The kinds that the text names for the mazes (sections IV-A and IV-B)."""
+
+GENERAL = "hit+detour+opposite"
+"""The general list of section III-B, as far as it makes sense in a maze."""
 
 SETS = (
     "none",
@@ -27,66 +33,86 @@ SETS = (
     "far-detour",
     "hit+near-detour",
     "hit+far-detour",
-    "hit+detour",
+    NAMED,
     "opposite",
-    "hit+detour+opposite",
+    GENERAL,
 )
-"""The sets of incorrect demonstrations that stand beside the default (INCORRECT-KINDS)."""
+"""The sets of incorrect demonstrations of the mazes that are compared (INCORRECT-KINDS)."""
 
-SETS_METHOD = "unified-incorrect"
-"""The method that is given each set; the empty set stands for its baseline."""
+NONE = "none"
+"""The set of a method that is not given incorrect demonstrations."""
 
-Key = tuple[str, str]
-"""Method, and reading of Eq. 9; the reading is empty for a method without a trace."""
+Key = tuple[str, str, str]
+"""Method, reading of Eq. 9, and set of incorrect demonstrations, as in a table of trials.
+
+The reading is empty for a method without a trace.
+"""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """One of the paper's experiments: the file of its demonstrations, its choices, its methods."""
+    """One of the paper's experiments: the file of its demonstrations, its choices, its methods.
+
+    `sets` are the sets of incorrect demonstrations by which it is judged.
+    """
 
     demos: str
     choices: Mapping[str, Any]
     methods: tuple[str, ...]
+    sets: tuple[str, ...]
 
     def conditions(self) -> dict[Key, Condition]:
         """Return the conditions that stand behind its figures and tables."""
-        return method_conditions(load_demos(resolve(self.demos)), self.choices, self.methods)
-
-    @property
-    def set(self) -> str:
-        """The set of incorrect demonstrations that its methods are given."""
-        return Params.of(**self.choices).demonstrations.incorrect
+        demos = load_demos(resolve(self.demos))
+        return conditions_of(demos, self.choices, self.methods, self.sets)
 
 
 EXPERIMENTS = {
-    "open-maze": Experiment("data/demos/open_maze.json", {}, tuple(METHODS)),
-    "obstacle-maze": Experiment("data/demos/obstacle_maze.json", {}, tuple(METHODS)),
+    "open-maze": Experiment("data/demos/open_maze.json", {}, tuple(METHODS), (NAMED, GENERAL)),
+    "obstacle-maze": Experiment(
+        "data/demos/obstacle_maze.json", {}, tuple(METHODS), (NAMED, GENERAL)
+    ),
     "soccer": Experiment(
-        "data/demos/soccer.json",
-        {**SOCCER, "incorrect": "all"},
-        ("unified", "unified-incorrect"),
+        "data/demos/soccer.json", SOCCER, ("unified", "unified-incorrect"), ("all",)
     ),
 }
 """By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension."""
 
+CALIBRATED: Mapping[str, Mapping[str, float]] = {"updated": {}}
+"""Choices under a reading of Eq. 9 that differ from the defaults (ALPHA and F-START)."""
 
-def method_conditions(
-    demos: Demos, choices: Mapping[str, Any], methods: Iterable[str] = tuple(METHODS)
+
+def conditions_of(
+    demos: Demos,
+    choices: Mapping[str, Any],
+    methods: Iterable[str] = tuple(METHODS),
+    sets: Iterable[str] = (NAMED, GENERAL),
 ) -> dict[Key, Condition]:
-    """Return a condition for each method, under both readings of Eq. 9 where it has a trace.
+    """Return a condition for each method, reading of Eq. 9 and set of incorrect demonstrations.
+
+    Sets with a kind that the demonstrations lack are left out; if nothing is left, all of the
+    demonstrations are one set.
 
     Raises
     ------
     ChoiceError
-        If a choice is unknown, its value is not registered, or it is the reading of Eq. 9.
+        If a choice is unknown, its value is not registered, or it is a reading or a set.
     """
-    if "f_index" in choices:
-        raise ChoiceError("choices: f_index is run both ways; leave it out")
+    for name in ("f_index", "incorrect"):
+        if name in choices:
+            raise ChoiceError(f"choices: {name} is run in every way; leave it out")
+    shown = [
+        name
+        for name in sets
+        if name != NONE and (name == "all" or {*name.split("+")} <= {*demos.kinds})
+    ]
+    if not shown and demos.kinds:
+        shown = ["all"]
     return {
-        (name, reading): Condition(demos, name, _params(choices, reading))
-        for reading in ("", *READINGS)
+        (name, reading, set): Condition(demos, name, _params(choices, reading, set))
         for name in methods
-        if reading in get_method(name).readings
+        for set in (shown if get_method(name).uses_incorrect else [NONE])
+        for reading in get_method(name).readings
     }
 
 
@@ -96,28 +122,6 @@ def rule_conditions(demos: Demos, choices: Mapping[str, Any]) -> dict[str, Condi
     return {
         str(rule): Condition(demos, "adaboost", Params.of(**{**choices, "adaboost_rule": rule}))
         for rule in (entry.default, *entry.alternatives)
-    }
-
-
-def set_conditions(
-    demos: Demos, choices: Mapping[str, Any], sets: Iterable[str] = SETS
-) -> dict[Key, Condition]:
-    """Return a condition for each set of incorrect demonstrations, by set and reading of Eq. 9.
-
-    Sets with a kind that the demonstrations lack are left out; demonstrations of other kinds than
-    ours form one set.
-    """
-    names = [name for name in sets if name == "none" or {*name.split("+")} <= {*demos.kinds}]
-    if names == ["none"] and demos.kinds:
-        names.append("all")
-    return {
-        (name, reading): Condition(
-            demos,
-            get_method(SETS_METHOD).baseline if name == "none" else SETS_METHOD,
-            _params(choices, reading, name),
-        )
-        for name in names
-        for reading in READINGS
     }
 
 
@@ -139,32 +143,18 @@ def condition_of(task: str, method: str, reading: str, set: str) -> Condition:
     return condition
 
 
-def _params(choices: Mapping[str, Any], reading: str, set: str = "none") -> Params:
-    # A method without incorrect demonstrations keeps the default, by which its errors are counted.
-    chosen = {"f_index": reading} if reading else {}
-    chosen |= {} if set == "none" else {"incorrect": set}
-    return Params.of(**{**choices, **chosen})
+def _params(choices: Mapping[str, Any], reading: str, set: str) -> Params:
+    chosen = {"f_index": reading, **CALIBRATED.get(reading, {})} if reading else {}
+    return Params.of(**{**chosen, **choices, "incorrect": set})
 
 
 def main_trials(trials: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the experiments' own conditions, without the other sets."""
-    default = trials["task"].map({task: each.set for task, each in EXPERIMENTS.items()})
-    return trials[(trials["set"] == "none") | (trials["set"] == default)]
-
-
-def applies(own: str, reading: str) -> bool:
-    """Return whether what has one reading of Eq. 9, or none, counts under another one.
-
-    A method without a trace counts under both.
-
-    Examples
-    --------
-    >>> [applies(own, "printed") for own in ("", "printed", "updated")]
-    [True, True, False]
-    """
-    return own in ("", reading)
+    judged = {(task, set) for task, each in EXPERIMENTS.items() for set in (NONE, *each.sets)}
+    return trials[[key in judged for key in zip(trials["task"], trials["set"], strict=True)]]
 
 
 def under(rows: pd.DataFrame, reading: str) -> pd.DataFrame:
-    """Return the rows that count under a reading of Eq. 9."""
-    return rows[[applies(own, reading) for own in rows["reading"]]]
+    """Return the rows that count under a reading of Eq. 9, see :meth:`Method.under`."""
+    pairs = zip(rows["method"], rows["reading"], strict=True)
+    return rows[[get_method(method).under(reading) == own for method, own in pairs]]

@@ -5,33 +5,68 @@ One file because a verdict is read with the numbers and the reason that stand be
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from replication.errors import UserError
-from replication.evidence.claims import Claim, ClaimError, Claims, Judging, criteria_hash
-from replication.evidence.experiments import EXPERIMENTS, main_trials, under
+from replication.evidence.claims import (
+    TESTED,
+    Claim,
+    ClaimError,
+    Claims,
+    Judging,
+    criteria_hash,
+)
+from replication.evidence.experiments import EXPERIMENTS, NONE, main_trials
 from replication.evidence.statistics import (
-    compare,
+    detectable,
+    effect_prediction,
+    equivalence_p,
     holm,
+    mean_interval,
     mean_prediction,
+    published_difference_se,
+    published_log_sd_ratio_se,
+    relative_equivalence_p,
+    run_p,
     sd_interval,
     sd_prediction,
+    sd_ratio_interval,
     share_interval,
-    summarise,
+    sign_flip_p,
+    spread_equivalence_p,
+    spread_p,
+    standard_errors,
 )
 from replication.evidence.tables import read_table
+from replication.irl import get_method
 
-REPRODUCED = "reproduced"
-PARTLY = "partly"
-UNDECIDED = "undecided"
+SHOWN = "shown"
+ABSENT = "absent"
 REVERSED = "reversed"
-NOT_REPRODUCED = "not reproduced"
+INCONCLUSIVE = "inconclusive"
+CONSISTENT = "consistent"
+INCONSISTENT = "inconsistent"
 NOT_TESTABLE = "not testable"
+
+Array = NDArray[np.float64]
+
+EMPTY = (
+    "effect",
+    "low",
+    "high",
+    "margin",
+    "p",
+    "p_absent",
+    "paper",
+    "predicted_low",
+    "predicted_high",
+)
 
 
 def read_trials(figures: Path) -> pd.DataFrame:
@@ -61,7 +96,7 @@ def judged_trials(trials: pd.DataFrame, judging: Judging) -> pd.DataFrame:
 
 
 def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
-    """Return one row for each claim and reading of Eq. 9, with its verdict.
+    """Return one row for each claim and cell, with its verdict.
 
     Parameters
     ----------
@@ -73,189 +108,214 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `effect` with its 95 % interval `low` to `high` is the claim's statistic, `paper` the
-        published value of it. For published means and SDs, `predicted_low` to `predicted_high` is
-        where ours should lie. `fewer` is the probability that x is below y in one trial each, ties
-        counting half; `power` that of finding an effect as large as the published one. `p_holm` is
-        adjusted over all tests of the table. `why` is empty for what is reproduced or reversed.
-        `criteria` is the hash of the frozen file.
+        `effect` with its 95 % interval `low` to `high` is the claim's statistic, `margin` the
+        smallest effect of interest and `paper` the published one; ours is `consistent` with it if
+        it lies between `predicted_low` and `predicted_high`. `p` is that of the test of no effect,
+        `p_absent` that of equivalence within the margin; `p_holm` and `p_absent_holm` are adjusted
+        over the cells of the claim. `why` says what a verdict rests on where that is not in these
+        numbers. `criteria` is the hash of what was frozen.
 
     Raises
     ------
     ClaimError
         If a method that a claim is about has no trials.
     """
-    table = pd.DataFrame(
-        [
-            _row(claim, reading, measures)
-            for claim in claims.claim
-            for reading in _readings(measures, claim, claims.judging)
-        ]
-    )
-    table["p_holm"] = np.nan
-    tested = table["p"].notna()
-    table.loc[tested, "p_holm"] = holm(table.loc[tested, "p"].tolist())
-    by_id = {claim.id: claim for claim in claims.claim}
-    judged = [_verdict(by_id[row.id], row, claims.judging) for row in table.itertuples()]
-    table["verdict"], table["why"] = zip(*judged, strict=True)
+    rows = []
+    for claim in claims.claim:
+        cells = [_row(claim, reading, set, measures) for reading, set in claim.cells()]
+        for name in ("p", "p_absent"):
+            known = [row for row in cells if claim.statistic in TESTED and not np.isnan(row[name])]
+            for row, p in zip(known, holm([row[name] for row in known]), strict=True):
+                row[f"{name}_holm"] = float(p)
+        for row in cells:
+            row["verdict"], row["why"] = _verdict(claim, row, claims.judging)
+        rows += cells
+    table = pd.DataFrame(rows)
     table["criteria"] = criteria_hash()
     return table
 
 
-def overall(verdicts: Sequence[str]) -> str:
-    """Return the verdict on a claim from those under each reading of Eq. 9.
+def decide(
+    effect: float, *, neutral: float, p: float, p_absent: float, level: float, less: bool = False
+) -> str:
+    """Return the verdict on an effect, given the adjusted p-values of difference and equivalence.
 
-    A claim of which one reading cannot be tested gets no verdict: what the other reading gives
-    still stands in its row. So a number that made a choice under one reading is never judged.
-
-    Examples
-    --------
-    >>> overall(["reproduced", "undecided"]), overall(["not testable", "reproduced"])
-    ('partly', 'not testable')
-    >>> overall(["undecided", "not reproduced"]), overall(["reversed", "not reproduced"])
-    ('undecided', 'not reproduced')
-    """
-    if NOT_TESTABLE in verdicts:
-        return NOT_TESTABLE
-    if len(set(verdicts)) == 1:
-        return verdicts[0]
-    if REPRODUCED in verdicts:
-        return PARTLY
-    return UNDECIDED if UNDECIDED in verdicts else NOT_REPRODUCED
-
-
-def decide(low: float, high: float, margin: float, direction: str, p: float, level: float) -> str:
-    """Judge an interval and the adjusted p-value of the test beside it, NaN if there is none.
+    `neutral` is no effect, and `less` says that the claimed side is below it.
 
     Examples
     --------
-    >>> decide(-3.0, -1.0, 0.0, "less", 0.01, 0.05), decide(-3.0, -1.0, 0.0, "less", 0.08, 0.05)
-    ('reproduced', 'undecided')
-    >>> decide(1.0, 3.0, 0.0, "less", 0.01, 0.05), decide(-1.0, 1.0, 0.0, "less", 0.5, 0.05)
-    ('reversed', 'not reproduced')
+    >>> decide(3.0, neutral=0.0, p=0.01, p_absent=1.0, level=0.05)
+    'shown'
+    >>> decide(0.3, neutral=0.0, p=0.01, p_absent=0.01, level=0.05)
+    'absent'
+    >>> decide(0.8, neutral=1.0, p=0.2, p_absent=0.2, level=0.05, less=True)
+    'inconclusive'
     """
-    excluded = not low <= margin <= high
-    rejected = excluded if np.isnan(p) else p < level
-    if excluded != rejected:
-        return UNDECIDED
-    if not excluded:
-        return NOT_REPRODUCED
-    return REPRODUCED if (high < margin) == (direction == "less") else REVERSED
+    if p_absent < level:
+        return ABSENT
+    if not p < level:
+        return INCONCLUSIVE
+    return SHOWN if (effect < neutral) == less else REVERSED
 
 
-def _readings(measures: pd.DataFrame, claim: Claim, judging: Judging) -> list[str]:
-    """Return the readings of Eq. 9 that the first method of a claim was run under."""
-    used = set(_trials_of(measures, claim.task, claim.x)["reading"])
-    return [reading for reading in (*judging.readings, "") if reading in used]
-
-
-def _row(claim: Claim, reading: str, measures: pd.DataFrame) -> dict[str, Any]:
-    x = _paired(measures, claim.task, claim.x, reading)
-    y = _paired(measures, claim.task, claim.y, reading) if claim.y else x
+def _row(claim: Claim, reading: str, set: str, measures: pd.DataFrame) -> dict[str, Any]:
+    x = trials_of(measures, claim.task, claim.x, reading, set)
+    y = trials_of(measures, claim.task, claim.y, reading, set) if claim.y else x
+    both = np.intersect1d(x["trial"], y["trial"])
+    x, y = (rows.set_index("trial").loc[both] for rows in (x, y))
+    capped = int((x["converged"] == 0).sum() + (claim.y != "") * (y["converged"] == 0).sum())
     row: dict[str, Any] = {
         "id": claim.id,
         "claim": claim.claim,
         "place": claim.place,
         "task": claim.task,
         "reading": reading,
+        "set": set,
         "measure": claim.measure,
         "statistic": claim.statistic,
         "x": claim.x,
         "y": claim.y,
-        "direction": claim.direction,
-        "margin": claim.margin if claim.direction != "inside" else np.nan,
-        "test": claim.test,
-        "n": len(x),
-        "capped": int((x["converged"] == 0).sum() + (claim.y != "") * (y["converged"] == 0).sum()),
-        "paper": claim.paper_effect,
+        "n": len(both),
+        "capped": capped,
     }
-    counts = ("effect", "low", "high", "predicted_low", "predicted_high", "fewer", "p", "power")
-    return row | dict.fromkeys(counts, np.nan) | _numbers(claim, x, y)
-
-
-def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]:
-    """Return the effect, its interval and whatever else the claim's statistic gives."""
-    a, b = x[claim.measure].to_numpy(float), y[claim.measure].to_numpy(float)
+    row |= dict.fromkeys(EMPTY, np.nan)
+    row |= {"p_holm": np.nan, "p_absent_holm": np.nan, "consistent": ""}
+    row["paper"] = claim.paper_effect
+    a, b = (rows[claim.measure].to_numpy(float) for rows in (x, y))
     if claim.statistic == "share":
         share, n = min((values.mean(), len(values)) for values in (a, b))
         low, high = share_interval(round(share * n), n)
-        return {"effect": share, "low": low, "high": high}
-    if not (x["converged"].all() and y["converged"].all()):  # at the cap there is no count
-        return {}
-    if claim.statistic in ("mean-difference", "mean"):
-        shift = 0.0 if claim.y else claim.margin
-        against = b if claim.y else np.full(len(a), shift)
-        result = compare(a, against, published=claim.paper_effect)
-        return {
-            "effect": result.difference + shift,
-            "low": result.low + shift,
-            "high": result.high + shift,
-            "fewer": result.fewer if claim.y else np.nan,
-            "p": result.p_wilcoxon,
-            "power": result.power,
-        }
-    if claim.statistic == "sd-ratio":
-        result = compare(a, b)
-        bounds = {"low": result.sd_low, "high": result.sd_high}
-        return {"effect": result.sd_ratio, **bounds, "p": result.p_spread}
-    ours = summarise(a, x["converged"])
-    if claim.statistic == "published-run":
-        low, high = np.quantile(a, [0.025, 0.975])
-        return {"effect": ours.median, "low": float(low), "high": float(high)}
-    paper = claim.published(claim.x)
-    if claim.statistic == "published-mean":
-        low, high = mean_prediction(paper.mean, paper.sd, paper.n, ours.n)
-        moments = {"effect": ours.mean, "low": ours.low, "high": ours.high}
-    else:
-        low, high = sd_prediction(paper.sd, paper.n, a)
-        sd_low, sd_high = sd_interval(a)
-        moments = {"effect": ours.sd, "low": sd_low, "high": sd_high}
-    return moments | {"predicted_low": low, "predicted_high": high}
+        return row | {"effect": share, "low": low, "high": high, "margin": claim.margin}
+    if capped:  # at the cap there is no count
+        return row
+    numbers = _NUMBERS[claim.statistic](claim, a, b)
+    if not np.isnan(numbers.get("predicted_low", np.nan)):
+        inside = numbers["predicted_low"] <= numbers["effect"] <= numbers["predicted_high"]
+        row["consistent"] = "yes" if inside else "no"
+    return row | numbers
 
 
-def _verdict(claim: Claim, row: Any, judging: Judging) -> tuple[str, str]:
-    """Return the verdict on a row, and the reason unless it is reproduced or reversed."""
-    used = claim.used.get("all") or claim.used.get(row.reading or "all")
-    if used:
-        return NOT_TESTABLE, used
-    if row.n < judging.fewest:
-        return NOT_TESTABLE, f"{row.n} trials; {judging.fewest} are needed"
-    if np.isnan(row.effect) and row.capped:
-        return NOT_TESTABLE, f"{row.capped} trials at the iteration cap"
-    if np.isnan([row.effect, row.low, row.high]).any():
+def _saved(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    d = y - x
+    low, high = mean_interval(d)
+    row = {"effect": d.mean(), "low": float(low), "high": float(high), "p": sign_flip_p(d)}
+    if claim.fraction is not None:
+        margin = claim.fraction * y.mean()
+        return row | {"margin": margin, "p_absent": relative_equivalence_p(x, y, claim.fraction)}
+    moments = [number for name in (claim.x, claim.y) for number in claim.paper[name][1:]]
+    se = published_difference_se(*moments)
+    margin = detectable(se) if claim.margin is None else claim.margin
+    row |= {"margin": margin, "p_absent": equivalence_p(d, margin)}
+    if np.isnan(se):
+        return row
+    ours = float(standard_errors(low, high, len(d) - 1))
+    return row | _predicted(*effect_prediction(claim.paper_effect, se, ours))
+
+
+def _sd_ratio(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    ratio, low, high = map(float, sd_ratio_interval(x, y))
+    se = published_log_sd_ratio_se(claim.paper[claim.x][2], claim.paper[claim.y][2])
+    margin = float(np.exp(-detectable(se)))
+    ours = float(standard_errors(np.log(low), np.log(high)))
+    bounds = effect_prediction(np.log(claim.paper_effect), se, ours)
+    return {
+        "effect": ratio,
+        "low": low,
+        "high": high,
+        "margin": margin,
+        "p": spread_p(x, y),
+        "p_absent": spread_equivalence_p(x, y, 1 / margin),
+    } | _predicted(*np.exp(bounds))
+
+
+def _mean(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    low, high = mean_interval(x)
+    return {"effect": x.mean(), "low": float(low), "high": float(high), "p": sign_flip_p(x)}
+
+
+def _published_mean(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    mean, sd, n = claim.paper[claim.x]
+    low, high = mean_interval(x)
+    row = {"effect": x.mean(), "low": float(low), "high": float(high)}
+    return row | _predicted(*mean_prediction(mean, sd, n, len(x)))
+
+
+def _published_sd(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    _, sd, n = claim.paper[claim.x]
+    low, high = sd_interval(x)
+    row = {"effect": x.std(ddof=1), "low": low, "high": high}
+    return row | _predicted(*sd_prediction(sd, n, x))
+
+
+def _published_run(claim: Claim, x: Array, y: Array) -> dict[str, float]:
+    low, middle, high = np.quantile(x, [0.025, 0.5, 0.975])
+    run = claim.paper[claim.x][0]
+    return {"effect": middle, "low": float(low), "high": float(high), "p": run_p(x, run)}
+
+
+def _predicted(low: float, high: float) -> dict[str, float]:
+    return {"predicted_low": float(low), "predicted_high": float(high)}
+
+
+_NUMBERS = {
+    "saved": _saved,
+    "sd-ratio": _sd_ratio,
+    "mean": _mean,
+    "published-mean": _published_mean,
+    "published-sd": _published_sd,
+    "published-run": _published_run,
+}
+
+
+def _verdict(claim: Claim, row: dict[str, Any], judging: Judging) -> tuple[str, str]:
+    """Return the verdict in a cell, and what it rests on if that is not in its numbers."""
+    if claim.used:
+        return NOT_TESTABLE, claim.used
+    if row["n"] < judging.fewest:
+        return NOT_TESTABLE, f"{row['n']} trials; {judging.fewest} are needed"
+    if np.isnan(row["effect"]) and row["capped"]:
+        return NOT_TESTABLE, f"{row['capped']} trials at the iteration cap"
+    if np.isnan([row["effect"], row["low"], row["high"]]).any():
         return NOT_TESTABLE, "the trials do not vary"
+    if claim.statistic == "share":
+        if row["low"] > row["margin"]:
+            return SHOWN, ""
+        return (ABSENT if row["high"] < row["margin"] else INCONCLUSIVE), ""
     if claim.statistic == "published-run":
-        if row.low <= row.paper <= row.high:
-            return REPRODUCED, ""
-        return NOT_REPRODUCED, "the paper's run lies outside the central 95 % of ours"
-    if claim.direction == "inside":
-        if row.predicted_low <= row.effect <= row.predicted_high:
-            return REPRODUCED, ""
-        return NOT_REPRODUCED, "ours lies outside the range that the paper's predicts"
-    verdict = decide(row.low, row.high, claim.margin, claim.direction, row.p_holm, judging.level)
-    if verdict in (REPRODUCED, REVERSED):
-        return verdict, ""
-    if verdict == UNDECIDED:
-        if row.low <= claim.margin <= row.high:
-            return verdict, "the test rejects, but the interval includes the margin"
-        return verdict, "the interval excludes the margin, but the test does not reject"
-    if np.isnan(row.paper):
-        return verdict, "the interval includes the margin"
-    included = "and" if row.low <= row.paper <= row.high else "but not"
-    return verdict, f"the interval includes the margin, {included} the published effect"
+        return "", "a single run: only how probable it is"
+    if claim.is_published:
+        return (CONSISTENT if row["consistent"] == "yes" else INCONSISTENT), ""
+    less = claim.statistic == "sd-ratio"
+    p, p_absent = row["p_holm"], row["p_absent_holm"]
+    settings: dict[str, Any] = {"neutral": float(less), "less": less, "level": judging.level}
+    return decide(row["effect"], p=p, p_absent=p_absent, **settings), ""
 
 
-def _trials_of(measures: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
-    rows = measures[(measures["task"] == task) & (measures["method"] == method)]
+def trials_of(
+    measures: pd.DataFrame, task: str, method: str, reading: str, set: str
+) -> pd.DataFrame:
+    """Return the trials of a method that count in a cell, in order.
+
+    A method without a trace counts under each reading, and one that is given no incorrect
+    demonstrations beside each set.
+
+    Raises
+    ------
+    ClaimError
+        If there are none.
+    """
+    used = get_method(method)
+    own = {
+        "task": task,
+        "method": method,
+        "reading": used.under(reading),
+        "set": set if used.uses_incorrect else NONE,
+    }
+    rows = measures[(measures[list(own)] == list(own.values())).all(axis=1)]
     if rows.empty:
         notebook = task.replace("-", "_")
         raise ClaimError(f"no trials of {method} on {task}: run the notebook {notebook} first")
-    return rows
-
-
-def _paired(measures: pd.DataFrame, task: str, method: str, reading: str) -> pd.DataFrame:
-    """Return a method's trials in order; without a trace it has the same under each reading."""
-    return under(_trials_of(measures, task, method), reading).sort_values("trial")
+    return rows.sort_values("trial")
 
 
 def by_claim(table: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:

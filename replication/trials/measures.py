@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
 
 from replication.demos.model import Demos
 from replication.envs.soccer.field import SoccerField
 from replication.irl import Trial
+from replication.irl.agent import Episode
 from replication.irl.expectations import visited
 from replication.paper.published import FIGURE_12, TABLE_1
 from replication.paper.register import Chosen, choice
@@ -70,13 +70,14 @@ def trial_row(
     environment), `digest` and, if asked for, `errors`: d before each iteration and after the last
     one, separated by blanks.
     """
-    marked = marked_pairs(shown_demos(condition))
+    kinds = kind_pairs(condition.demos)
+    shown = marked_pairs(condition.selected)
 
     def row(trial: Trial, k: int, seed: int) -> dict[str, Any]:
         return (
             factors(condition)
             | {"trial": k, "seed": seed}
-            | measure(trial, condition.demos, marked, report)
+            | measure(trial, condition.demos, kinds, shown, report)
             | {"steps": trial.steps, "digest": digest(trial)}
             | ({"errors": " ".join(f"{d:.10g}" for d in trial.errors)} if errors else {})
         )
@@ -113,7 +114,11 @@ def factors(condition: Condition) -> dict[str, str]:
 
 
 def measure(
-    trial: Trial, demos: Demos, marked: NDArray[np.bool_], report: Report
+    trial: Trial,
+    demos: Demos,
+    kinds: Mapping[str, NDArray[np.bool_]],
+    shown: NDArray[np.bool_],
+    report: Report,
 ) -> dict[str, float]:
     """Return every measure of one trial, by name.
 
@@ -122,36 +127,64 @@ def measure(
     trial
         The trial.
     demos
-        The demonstrations that it learned from.
-    marked
-        Pairs that count as erroneous, `[state, action]`, see :func:`marked_pairs`.
+        All demonstrations of its task.
+    kinds
+        The pairs that each kind of incorrect demonstration marks, see :func:`kind_pairs`.
+    shown
+        The pairs that those mark which the method was given, `[state, action]`.
     report
         How long the initial phase is (EARLY), and when mid-term is (FIG7-MIDTERM).
     """
     early = early_iterations(demos, report)
-    path = demos.correct[0].states[:-1]
-    known = np.unique(np.concatenate([demo.states[:-1] for demo in demos.correct]))
-    values = trial.values[:, np.searchsorted(known, path)].astype(float)
     middle = round(report.mid_term * trial.iterations)
+    wrong = marked_pairs(demos)
+    loops = trial.episodes[1:]  # the first one is a random walk
     return {
         "iterations": trial.iterations,
         "converged": int(trial.converged),
-        "early_errors": early_errors(trial, marked, early),
-        "q_growth": round(float((values[-1] - values[middle]).mean()), DIGITS),
-        "q_slope": round(slope(values[-1]), DIGITS),
-        "reward_slope": round(slope(trial.weights[path].max(axis=1)), DIGITS),
+        "early_collisions": int(trial.collisions[:early].sum()),
+        "early_errors": sum(_errors(episode, wrong) for episode in loops[:early]),
+        "q_growth": _growth(trial.values, middle),
+        "reward_growth": _growth(trial.rewards, middle),
+        "acted": sum(_taken(episode, shown) for episode in loops),
+        "acted_at_first": _taken(trial.episodes[0], shown),
+        **{
+            f"with_{kind}": sum(_taken(episode, pairs) > 0 for episode in loops)
+            for kind, pairs in kinds.items()
+        },
     }
 
 
-def shown_demos(condition: Condition) -> Demos:
-    """Return the demonstrations whose incorrect ones a condition's own method may not be shown."""
-    return condition.demos.select(condition.params.demonstrations.incorrect)
+KINDS = ("hit", "detour", "opposite", "overspeed")
+"""The kinds of incorrect demonstrations that section III-B lists."""
+
+
+def kind_pairs(demos: Demos) -> dict[str, NDArray[np.bool_]]:
+    """Return the pairs that each kind of III-B's list marks, `[state, action]`."""
+    return {kind: marked_pairs(demos.select(kind)) for kind in KINDS if kind in demos.kinds}
 
 
 def marked_pairs(demos: Demos) -> NDArray[np.bool_]:
     """Return the pairs that an incorrect demonstration shows and no correct one."""
     shape = demos.environment.n_states, demos.environment.n_actions
     return visited(demos.incorrect, shape=shape) & ~visited(demos.correct, shape=shape)
+
+
+def _taken(episode: Episode, pairs: NDArray[np.bool_]) -> int:
+    """Return how many of some pairs an episode takes, each counted once."""
+    seen = np.zeros_like(pairs)
+    seen[episode.states[:-1], episode.actions] = True
+    return int((seen & pairs).sum())
+
+
+def _errors(episode: Episode, wrong: NDArray[np.bool_]) -> int:
+    """Return how many motions of an episode run into something, or take one of some pairs."""
+    return int((episode.hits | wrong[episode.states[:-1], episode.actions]).sum())
+
+
+def _growth(values: NDArray[np.float32], middle: int) -> float:
+    """Return the mean growth since an iteration, given values [iteration, state]."""
+    return round(float((values[-1].astype(float) - values[middle]).mean()), DIGITS)
 
 
 def early_iterations(demos: Demos, report: Report) -> int:
@@ -161,20 +194,3 @@ def early_iterations(demos: Demos, report: Report) -> int:
     return round(report.early * reported)
 
 
-def early_errors(trial: Trial, marked: NDArray[np.bool_], early: int) -> int:
-    """Count the erroneous motions in the trajectories after updates 1 ... `early`.
-
-    A motion is erroneous if it runs into a wall or an obstacle or takes a marked pair. A trial that
-    has converged by then makes no more.
-    """
-    return sum(
-        int((episode.hits | marked[episode.states[:-1], episode.actions]).sum())
-        for episode in trial.episodes[1 : early + 1]
-    )
-
-
-def slope(values: NDArray[np.float64]) -> float:
-    """Return Spearman's correlation of values with their position; 0 if all are equal."""
-    if np.ptp(values) == 0 or len(values) < 2:
-        return 0.0
-    return float(np.corrcoef(np.arange(len(values)), stats.rankdata(values))[0, 1])
