@@ -9,7 +9,7 @@ F_(i+1), choice F-INDEX) gets its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from itertools import product
 
@@ -41,7 +41,10 @@ TRACE = ("ALPHA", "F-START")
 """The choices that were calibrated: for all readings together, and for each trace."""
 
 SCREEN_TRIALS, FINAL_TRIALS = 10, 200
-"""Trials of each point in the first stage, and of each finalist in the second, from fresh seeds."""
+"""Trials of each point in the first stage, and of each finalist in the second."""
+
+SCREEN_SEED, FINAL_SEED = 21, 22
+"""Their root seeds."""
 
 WORLDS, POINTS = 5, 4
 """How many worlds go on to the second stage, and how many points of each trace in each of them."""
@@ -111,6 +114,9 @@ def kl_divergence(mean: float, sd: float, published: Published) -> float:
 
 SETS = (NAMED, GENERAL)
 
+PARTS = ("screen", "final", "fits")
+"""The stages, as the column `part` of the table of trials names them."""
+
 
 def declared_condition(part: str, number: int) -> Condition:
     """Return the condition of a row of the table of trials, by its stage and number."""
@@ -122,8 +128,8 @@ def declared_condition(part: str, number: int) -> Condition:
 
 def stages(
     *, screen_trials: int = SCREEN_TRIALS, final_trials: int = FINAL_TRIALS
-) -> list[Callable[[pd.DataFrame], list[Group]]]:
-    """Return what is run in each stage, given the trials of those before.
+) -> list[tuple[int, Callable[[pd.DataFrame], list[Group]]]]:
+    """Return the root seed of each stage, and what is run in it, given the trials before.
 
     First all points, then the finalists, then what incorrect demonstrations save at each of the
     finalists that fits.
@@ -146,7 +152,7 @@ def stages(
         numbers = [len(SETS) * place + rest for place in fitting for rest in range(len(SETS))]
         return [group("fits", number, final_trials) for number in numbers]
 
-    return [screen, final, fits]
+    return [(SCREEN_SEED, screen), (FINAL_SEED, final), (FINAL_SEED, fits)]
 
 
 def calibration_table(trials: pd.DataFrame, stage: str) -> pd.DataFrame:
@@ -280,8 +286,3 @@ def check_table(trials: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
 def rule_follows(table: pd.DataFrame) -> bool:
     """Return whether the register's defaults are what the rule takes from the second stage."""
     return nearest(table) == {trace: chosen(trace) for trace in TRACES}
-
-
-def fitting(table: pd.DataFrame) -> Sequence[Point]:
-    """Return the finalists that fit."""
-    return [_point(row) for _, row in table[table["fits"]].iterrows()]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 
 import joblib
@@ -16,13 +15,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from replication.demos.files import load_demos
-from replication.envs.maze import as_maze
-from replication.evidence import sweep
-from replication.evidence.calibration import grid_conditions
-from replication.evidence.experiments import EXPERIMENTS, condition_of
+from replication.evidence import calibration, rounding, sweep
+from replication.evidence.experiments import condition_of
 from replication.evidence.tables import csv_text
-from replication.files import read_file, resolve
+from replication.files import read_file
 from replication.irl import Trial
 from replication.trials.compute import compute, trial_key
 from replication.trials.condition import Condition
@@ -132,20 +128,16 @@ def declared_condition(row: Mapping[str, str]) -> Condition:
         return condition_of(**own)
     if int(row["number"]) < 0:
         raise LookupError(f"there is no number {row['number']}")
-    if row["part"] == "grid":
-        conditions = [_grid()[int(row["number"])]]
+    if row["part"] in calibration.PARTS:
+        conditions = [calibration.declared_condition(row["part"], int(row["number"]))]
+    elif row["part"] == rounding.PART:
+        conditions = [list(rounding.conditions().values())[int(row["number"])]]
     else:
         conditions = sweep.conditions_of(row["part"], int(row["number"]))
     for condition in conditions:
         if factors(condition) == own:
             return condition
     raise LookupError(f"{row['part']} {row['number']} has no {' '.join(own.values())}")
-
-
-@cache
-def _grid() -> list[Condition]:
-    demos = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
-    return list(grid_conditions(as_maze(demos.environment)).values())
 
 
 def _read(path: Path) -> pd.DataFrame:

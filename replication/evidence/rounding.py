@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from replication.evidence.experiments import EXPERIMENTS
+from replication.demos.files import load_demos
+from replication.evidence.experiments import EXPERIMENTS, NONE, conditions_of
 from replication.evidence.statistics import holm, mean_interval, sign_flip_p
+from replication.files import resolve
 from replication.irl import METHODS
 from replication.paper.register import Value, load_choices
 from replication.trials.condition import Condition
@@ -18,6 +23,9 @@ TRIALS = 100
 """Root seed and number of trials of each setting, tolerance and arithmetic."""
 
 LEVEL = 0.05
+
+PART = "rounding"
+"""What the column `part` of the table of trials has."""
 
 TASKS = ("open-maze", "obstacle-maze")
 METHOD_NAMES = ("adaboost", "unified")
@@ -49,16 +57,16 @@ def conditions() -> dict[tuple[Setting, Value, Value], Condition]:
     for setting, (tolerance, arithmetic) in product(settings(), variants()):
         task, method, reading = setting
         choices = {"tie_tolerance": tolerance, "arithmetic": arithmetic}
-        found[setting, tolerance, arithmetic] = EXPERIMENTS[task].condition(
-            method, reading, **choices
-        )
+        demos = load_demos(resolve(EXPERIMENTS[task].demos))
+        own = conditions_of(demos, choices, [method])
+        found[setting, tolerance, arithmetic] = own[method, reading, NONE]
     return found
 
 
 def plan(trials: int) -> list[Group]:
     """Return what is run: a group for each condition, with its place as the column `number`."""
     return [
-        Group([condition], trials, {"part": "rounding", "number": number})
+        Group([condition], trials, {"part": PART, "number": number})
         for number, condition in enumerate(conditions().values())
     ]
 
@@ -111,8 +119,11 @@ def chosen_tolerance(table: pd.DataFrame) -> float | None:
     return float(min(passing)) if len(passing) else None
 
 
-def _grouped(trials, keys):  # type: ignore[no-untyped-def]
-    grouped: dict = {}
+def _grouped(
+    trials: pd.DataFrame, keys: Sequence[tuple[Setting, Value, Value]]
+) -> dict[tuple[Setting, Value], dict[Value, NDArray[np.float64]]]:
+    """Return the iterations, [trial], by setting and tolerance, and then by arithmetic."""
+    grouped: dict[tuple[Setting, Value], dict[Value, NDArray[np.float64]]] = {}
     for number, own in trials.groupby("number"):
         setting, tolerance, arithmetic = keys[int(number)]
         counts = own.sort_values("trial")["iterations"].to_numpy(float)

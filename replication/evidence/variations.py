@@ -17,16 +17,15 @@ from replication.envs.maze import Maze, as_maze
 from replication.envs.soccer.field import SoccerField
 from replication.evidence.experiments import (
     EXPERIMENTS,
-    SETS_METHOD,
+    NONE,
     Key,
-    method_conditions,
+    conditions_of,
     rule_conditions,
 )
 from replication.evidence.specifications import RANDOM, Ablations, Specification, default_of
 from replication.files import resolve
-from replication.irl import READINGS, get_method
+from replication.irl import READINGS
 from replication.irl.expectations import visited
-from replication.paper.params import Params
 from replication.paper.register import Value, load_choices
 from replication.trials.condition import Condition
 
@@ -79,11 +78,16 @@ def soccer_conditions(specification: Specification, cap: int) -> dict[Key, Condi
 def _chosen_reading(
     demos: Demos, base: Mapping[str, Any], choices: Mapping[str, Value], methods: tuple[str, ...]
 ) -> dict[Key, Condition]:
-    """Return the conditions of some methods under the one reading of Eq. 9 that is chosen."""
+    """Return the conditions of some methods under the reading of Eq. 9 and the set chosen."""
     values = {**base, **{_name(id): value for id, value in choices.items()}}
-    reading = values.pop("f_index", default_of("F-INDEX"))
-    conditions = method_conditions(demos, values, methods)
-    return {key: condition for key, condition in conditions.items() if key[1] in ("", reading)}
+    reading = str(values.pop("f_index", default_of("F-INDEX")))
+    usual = "all" if "soccer" in demos.task else default_of("INCORRECT-KINDS")
+    conditions = conditions_of(demos, values, methods, [str(values.pop("incorrect", usual))])
+    return {
+        key: condition
+        for key, condition in conditions.items()
+        if condition.rule.under(reading) == key[1]
+    }
 
 
 def _name(id: str) -> str:
@@ -165,7 +169,7 @@ def ablation_conditions(ablations: Ablations, cap: int) -> dict[Ablation, Condit
 def trace_conditions(ablations: Ablations, cap: int) -> dict[Ablation, Condition]:
     """Return the default and the ablations of the trace.
 
-    They are those of the unified method without and with incorrect demonstrations, under both
+    They are those of the unified method without and with incorrect demonstrations, under the
     readings of Eq. 9. While the trace stays as it is, the readings differ in marked pairs alone.
     """
     conditions = {}
@@ -174,7 +178,7 @@ def trace_conditions(ablations: Ablations, cap: int) -> dict[Ablation, Condition
         name = Specification("ablation", choices).name
         for reading in READINGS:
             specification = Specification("ablation", (*choices, ("F-INDEX", reading)))
-            for (method, used), condition in maze_conditions(specification, cap).items():
+            for (method, used, _), condition in maze_conditions(specification, cap).items():
                 if used:
                     conditions[method, used, name] = condition
     return conditions
@@ -191,12 +195,9 @@ def numbered_conditions(ablations: Ablations, cap: int) -> dict[tuple[int, str],
     for number in ablations.numbers:
         n = len(every) if number == "all" else number
         shown = replace(demos, incorrect=tuple(every[:n]))
-        method = SETS_METHOD if n else get_method(SETS_METHOD).baseline
-        for reading in READINGS:
-            params = Params.of(
-                f_index=reading, max_iterations=cap, incorrect="all" if n else "none"
-            )
-            conditions[n, reading] = Condition(shown, method, params)
+        method = "unified-incorrect" if n else "unified"
+        own = conditions_of(shown, {"max_iterations": cap}, [method], ["all"] if n else [NONE])
+        conditions |= {(n, reading): condition for (_, reading, _), condition in own.items()}
     return conditions
 
 

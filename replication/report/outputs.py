@@ -8,7 +8,7 @@ page from it goes by that name.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,9 @@ from replication.trials.table import Group, computed_table, planned_table
 
 TRIALS = "trials.csv"
 """The file with the table of trials."""
+
+Stage = tuple[int, Callable[[pd.DataFrame], Sequence[Group]]]
+"""A root seed, and what is run with it, given the trials of the stages before."""
 
 
 class Shown:
@@ -79,12 +82,19 @@ class Outputs:
         write_csv(table, self.folder / f"{name}.csv")
 
     def computed(
-        self, groups: Sequence[Group], report: Report | None = None, *, seed: int, **options: Any
+        self, *stages: Stage, report: Report | None = None, **options: Any
     ) -> pd.DataFrame:
         """Return the table of trials, on which everything else rests, as trials.csv has it.
 
         It is computed, see :func:`replication.trials.table.computed_table`, unless the environment
         variable GIVEN names a folder that has it: so everything else can be made again from it.
+
+        Parameters
+        ----------
+        stages
+            The root seed of each stage, and what is run in it, given the trials of those before.
+        report, options
+            See :func:`replication.trials.table.computed_table`.
 
         Raises
         ------
@@ -92,12 +102,21 @@ class Outputs:
             If the given table has other trials than the plan.
         """
         given = os.environ.get(GIVEN)
-        if given:
-            table = read_table(Path(given) / TRIALS)
-            _check_planned(table, planned_table(groups, seed), Path(given) / TRIALS)
-        else:
-            table = computed_table(groups, report, seed=seed, **options)
-        return read_table(write_csv(table, self.folder / TRIALS))
+        if not given:
+            table = pd.DataFrame()
+            for seed, plan in stages:
+                new = computed_table(plan(table), report, seed=seed, **options)
+                table = pd.concat([table, new], ignore_index=True)
+                table = read_table(write_csv(table, self.folder / TRIALS))
+            return table
+        file, planned = Path(given) / TRIALS, pd.DataFrame()
+        known = read_table(file)
+        for seed, plan in stages:
+            new = planned_table(plan(known[: len(planned)]), seed)
+            planned = pd.concat([planned, new], ignore_index=True)
+            _check_planned(known[: len(planned)], planned, file)
+        _check_planned(known, planned, file)
+        return read_table(write_csv(known, self.folder / TRIALS))
 
 
 def _check_planned(table: pd.DataFrame, planned: pd.DataFrame, file: Path) -> None:

@@ -48,8 +48,8 @@ class Course:
 
     Attributes
     ----------
-    method, reading
-        What learned, and under which reading of Eq. 9.
+    method, reading, set
+        What learned, under which reading of Eq. 9, and from which incorrect demonstrations.
     errors
         d (Eq. 6), [n + 1].
     ways
@@ -60,6 +60,7 @@ class Course:
 
     method: str
     reading: str
+    set: str
     errors: Floats
     ways: tuple[Floats, ...]
     weights: Floats
@@ -67,7 +68,7 @@ class Course:
     @property
     def label(self) -> str:
         """How it is called."""
-        return full_label(self.method, self.reading)
+        return full_label(self.method, self.reading, self.set)
 
     @property
     def iterations(self) -> int:
@@ -78,11 +79,11 @@ class Course:
 def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
     """Return the courses of trials that kept their snapshots, in a maze or on the soccer field."""
     shown = []
-    for (method, reading), trial in trials.items():
+    for (method, reading, set), trial in trials.items():
         assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
         ways = tuple(_way(demos, episode.states, episode.actions) for episode in trial.episodes)
         weights = _shown_weights(demos, trial.snapshots.weights)
-        shown.append(Course(method, reading, trial.errors, ways, weights))
+        shown.append(Course(method, reading, set, trial.errors, ways, weights))
     return shown
 
 
@@ -112,6 +113,7 @@ def _numbers(course: Course) -> pd.DataFrame:
         {
             "method": course.method,
             "reading": course.reading,
+            "set": course.set,
             "iteration": range(course.iterations + 1),
             "error": course.errors,
             "moves": [len(way) - 1 for way in course.ways],

@@ -9,11 +9,20 @@ import numpy as np
 import pandas as pd
 
 from replication.evidence.claims import LABELS
-from replication.evidence.verdicts import NOT_TESTABLE, REPRODUCED, overall
+from replication.evidence.experiments import GENERAL, NAMED, NONE
+from replication.evidence.verdicts import NOT_TESTABLE, SHOWN
 from replication.irl import READINGS, get_method
 
-F_LABELS = {"": "–", "printed": "Fᵢ (printed)", "updated": "Fᵢ₊₁ (updated)"}
+F_LABELS = {
+    "": "–",
+    "printed": "Fᵢ (printed)",
+    "updated": "Fᵢ₊₁ (updated)",
+    "at-once": "Fᵢ, maximum at once",
+}
 """How a reading of Eq. 9 is called in tables and figures; a method without a trace has none."""
+
+SET_LABELS = {NONE: "–", NAMED: "named kinds", GENERAL: "general list", "all": "all four kinds"}
+"""How the judged sets of incorrect demonstrations are called; others have their kinds as name."""
 
 Form = Callable[[Any], object]
 """What a reader sees of a row, which is a named tuple."""
@@ -37,9 +46,10 @@ def markdown(table: pd.DataFrame) -> str:
 # --- forms -----------------------------------------------------------------------------------
 
 
-def full_label(method: str, reading: str) -> str:
-    """Return a method's label, with the reading of Eq. 9 if it has one."""
+def full_label(method: str, reading: str, set: str = NONE) -> str:
+    """Return a method's label, with its incorrect demonstrations and reading of Eq. 9, if any."""
     label = get_method(method).label
+    label = label if set == NONE else f"{label} ({SET_LABELS.get(set, set)})"
     return f"{label}, {F_LABELS[reading]}" if reading else label
 
 
@@ -62,6 +72,7 @@ METHOD: dict[str, Form] = {
     "Method": lambda row: get_method(row.method).label,
     "Reading": lambda row: F_LABELS[row.reading],
 }
+SET: dict[str, Form] = {"Incorrect": lambda row: SET_LABELS.get(row.set, row.set)}
 MEAN: dict[str, Form] = {
     "Mean [95 %]": lambda row: interval(row.mean, row.low, row.high),
     "SD": lambda row: number(row.sd),
@@ -74,7 +85,7 @@ CAPPED: dict[str, Form] = {"At the cap": lambda row: f"{row.capped} of {row.n}"}
 
 def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
     """Return a summary of methods: mean (SD) beside the paper's."""
-    columns = METHOD | MEAN
+    columns = METHOD | SET | MEAN
     columns["Median (quartiles)"] = lambda row: (
         f"{row.median:g} ({row.quartile_1:g}–{row.quartile_3:g})"
     )
@@ -93,88 +104,108 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def readable_contrasts(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of contrasts: differences and ratios with their intervals."""
+    """Return a table of contrasts: what the first method saves, with intervals."""
     return readable(
         table,
         {
             "Compared": lambda row: f"{get_method(row.x).label} against {get_method(row.y).label}",
             "Reading": METHOD["Reading"],
-            "Iterations [95 %]": lambda row: interval(row.difference, row.low, row.high),
+            **SET,
+            "Iterations saved [95 %]": lambda row: interval(row.saved, row.low, row.high),
+            "Steps saved": lambda row: f"{row.steps_saved:.1%}",
             "SD × [95 %]": lambda row: interval(row.sd_ratio, row.sd_low, row.sd_high),
             "P(fewer)": lambda row: number(row.fewer),
-            "p, signed rank": lambda row: p_value(row.p_wilcoxon),
+            "p": lambda row: p_value(row.p),
             "p, spread": lambda row: p_value(row.p_spread),
         },
     )
 
 
 def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of sets, both readings of Eq. 9 in one row."""
+    """Return a table of sets, all readings of Eq. 9 in one row."""
     keys = ["set", "demonstrations", "pairs", "leaving", "beside"]
-    parts = [table[keys].drop_duplicates().rename(columns=str.capitalize).reset_index(drop=True)]
+    keys = [key for key in keys if key in table]
+    shown = table[keys].drop_duplicates().rename(columns=str.capitalize).set_index("Set")
     for reading, rows in table.groupby("reading", sort=False):
-        label = F_LABELS[reading]
-        columns: dict[str, Form] = {
-            f"{label}: mean (SD)": lambda row: f"{number(row.mean)} ({number(row.sd)})",
-            f"{label}: saves": lambda row: (
-                "–"
-                if row.set == "none"
-                else interval(0 - row.difference, 0 - row.high, 0 - row.low)
-            ),
-        }
-        parts.append(readable(rows, columns))
-    return pd.concat(parts, axis=1)
+        cells = readable(
+            rows,
+            {
+                "Set": lambda row: row.set,
+                f"{F_LABELS[reading]}: saves": lambda row: interval(row.saved, row.low, row.high),
+            },
+        )
+        shown = shown.join(cells.set_index("Set"))
+    return shown.fillna("–").reset_index()
 
 
 # --- judged claims ---------------------------------------------------------------------------
 
 
 def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
-    """Return judged claims: one row a claim, both readings side by side."""
+    """Return judged claims: one row a claim and set of demonstrations, the readings side by side."""
     rows = []
     for _, part in table.groupby("id", sort=False):
-        first = part.iloc[0]
-        paper = number(first["paper"])
-        if first["statistic"] == "sd-ratio":
-            paper = f"× {paper}"
-        # A method without a trace has its effect in the first column only.
-        effects = {row.reading or READINGS[0]: _effect(row) for row in part.itertuples()}
-        row = {"Claim": first["claim"], "Place": first["place"], "Paper": paper}
-        row |= {F_LABELS[reading]: effects.get(reading, "–") for reading in READINGS}
-        rows.append({**row, "Verdict": _verdict(part)})
+        for place, (set, cells) in enumerate(part.groupby("set", sort=False)):
+            first = cells.iloc[0]
+            shown = {row.reading or READINGS[0]: cell(row) for row in cells.itertuples()}
+            row = {"Claim": first["claim"] if place == 0 else "", "Place": first["place"]}
+            row |= {"Paper": _paper(first), "Incorrect": SET_LABELS[set]}
+            rows.append(row | {F_LABELS[name]: shown.get(name, "–") for name in READINGS})
     return pd.DataFrame(rows)
 
 
-def verdict_lines(table: pd.DataFrame) -> list[str]:
-    """Return judged claims for a terminal, below a head: a line each, the verdict first."""
-    lines = [("verdict", "paper", *(F_LABELS[reading] for reading in READINGS), "claim")]
-    shown = readable_verdicts(table).to_dict("records")
-    for (id, part), row in zip(table.groupby("id", sort=False), shown, strict=True):
-        effects = (row[F_LABELS[reading]] for reading in READINGS)
-        verdict, claim = overall(part["verdict"].tolist()), LABELS.get(str(id), str(id))
-        lines.append((verdict, row["Paper"], *effects, claim))
-    return ["{:<16}{:<8}{:<23}{:<23}{}".format(*line) for line in lines]
-
-
-def _verdict(part: pd.DataFrame) -> str:
-    """Return the verdict on a claim; why there is none, or what each reading gives."""
-    verdict = overall(part["verdict"].tolist())
-    if verdict == NOT_TESTABLE:
-        verdict = f"{verdict}: {part['why'][part['verdict'] == NOT_TESTABLE].iloc[0]}"
-    elif part["verdict"].nunique() > 1:
-        each = (f"{F_LABELS[row.reading].split()[0]} {row.verdict}" for row in part.itertuples())
-        verdict = f"{verdict} ({', '.join(each)})"
-    return f"**{verdict}**" if verdict == REPRODUCED else verdict
-
-
-def _effect(row: Any) -> str:
-    """Return an effect with its interval, in the unit of its statistic."""
-    if np.isnan(row.effect):
-        return "–"
+def cell(row: Any) -> str:
+    """Return the verdict in a cell with its effect and interval, in the unit of its statistic."""
+    if row.verdict == NOT_TESTABLE and np.isnan(row.effect):
+        return f"{NOT_TESTABLE}: {row.why}"
     if row.statistic == "published-run":
-        return f"median {row.effect:g}; {row.low:.0f} to {row.high:.0f}"
+        return f"median {row.effect:g}; p = {p_value(row.p)}"
     text = interval(row.effect, row.low, row.high)
-    return f"× {text}" if row.statistic == "sd-ratio" else text
+    text = f"× {text}" if row.statistic == "sd-ratio" else text
+    verdict = f"**{row.verdict}**" if row.verdict == SHOWN else row.verdict
+    return f"{verdict} {text}"
+
+
+def _paper(row: pd.Series) -> str:
+    text = number(row["paper"])
+    return f"× {text}" if row["statistic"] == "sd-ratio" else text
+
+
+def sentence(part: pd.DataFrame) -> str:
+    """Return the verdicts on a claim in all its cells, in one sentence.
+
+    `part` has the rows of one claim in a table of verdicts.
+    """
+    if part["verdict"].nunique() == 1:
+        verdict = str(part["verdict"].iloc[0])
+        if verdict == NOT_TESTABLE:
+            return f"{verdict}: {part['why'].iloc[0]}"
+        return f"{verdict} in every cell" if len(part) > 1 else verdict
+    texts = [_of_set(rows) for _, rows in part.groupby("set", sort=False)]
+    names = [SET_LABELS[set] for set in part["set"].unique()]
+    if len(texts) == 1:
+        return texts[0]
+    return "; ".join(f"{name}: {text}" for name, text in zip(names, texts, strict=True))
+
+
+def _of_set(rows: pd.DataFrame) -> str:
+    """Return the verdicts with one set: a single one, or by reading."""
+    if rows["verdict"].nunique() == 1:
+        return f"{rows['verdict'].iloc[0]}{' under every reading' if len(rows) > 1 else ''}"
+    parts = []
+    for verdict, some in rows.groupby("verdict", sort=False):
+        labels = " and ".join(F_LABELS[reading] for reading in some["reading"])
+        parts.append(f"{verdict} under {labels}")
+    return ", ".join(parts)
+
+
+def verdict_lines(table: pd.DataFrame) -> list[str]:
+    """Return judged claims for a terminal: what each says, and its verdicts in one sentence."""
+    width = max(len(LABELS.get(id, id)) for id in table["id"].unique())
+    return [
+        f"{LABELS.get(str(id), str(id)):<{width}}  {sentence(part)}"
+        for id, part in table.groupby("id", sort=False)
+    ]
 
 
 # --- specifications --------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -40,7 +40,7 @@ class Study(Outputs):
     store, out
         The file of finished trials, and the folder for the results.
     sets
-        Whether the sets of incorrect demonstrations are run as well.
+        Sets of incorrect demonstrations that are run beside those by which the paper is judged.
     report
         Fields of :class:`replication.trials.measures.Report`, such as the number of trials.
     """
@@ -55,7 +55,7 @@ class Study(Outputs):
         jobs: int,
         store: str,
         out: str,
-        sets: bool = True,
+        sets: Sequence[str] = (),
         **report: Any,
     ) -> None:
         super().__init__(resolve(out))
@@ -64,8 +64,9 @@ class Study(Outputs):
         self.choices = {**design.choices, **choices}
         self.report = Report(**report)
         self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
-        self.conditions = experiments.method_conditions(self.demos, self.choices, design.methods)
-        self.sets = experiments.set_conditions(self.demos, self.choices) if sets else {}
+        given = self.demos, self.choices, design.methods
+        self.conditions = experiments.conditions_of(*given, design.sets)
+        self.sets = experiments.conditions_of(*given, sets)
         own = self.demos.task == experiment
         self.published: Mapping[str, Published] = PUBLISHED[experiment] if own else {}
         curves = PUBLISHED_CURVES.get(experiment, {})
@@ -78,24 +79,30 @@ class Study(Outputs):
             Group(list(self.conditions.values()), self.report.trials),
             Group(list(self.sets.values()), self.report.set_trials),
         ]
-        return self.computed(groups, self.report, errors=True, **self.settings)
+        settings = {**self.settings}
+        stage = settings.pop("seed"), lambda _: groups
+        return self.computed(stage, report=self.report, errors=True, **settings)
 
     @cached_property
     def main(self) -> pd.DataFrame:
         """The rows of the methods' own trials."""
         own = [tables.rows_of(self.trials, each) for each in self.conditions.values()]
-        return pd.concat([rows.head(self.report.trials) for rows in own], ignore_index=True)
+        return pd.concat(own, ignore_index=True)
 
     def of(self, *methods: str) -> pd.DataFrame:
         """Return the rows of some methods' own trials."""
         return self.main[self.main["method"].isin(methods)].reset_index(drop=True)
 
-    def traced(self, reading: str) -> dict[Key, Trial]:
-        """Return the trial of each method that kept every iteration, under a reading of Eq. 9."""
+    def traced(self, reading: str, set: str) -> dict[Key, Trial]:
+        """Return the trial of each method that kept every iteration.
+
+        `reading` is that of Eq. 9, `set` that of incorrect demonstrations, for methods that have
+        one.
+        """
         shown = {
             key: condition
             for key, condition in self.conditions.items()
-            if experiments.applies(key[1], reading)
+            if key[1] == condition.rule.under(reading) and key[2] in (experiments.NONE, set)
         }
         results = run_trials(list(shown.values()), trials=TRACED_TRIAL + 1, **self.settings)
         return {

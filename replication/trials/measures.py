@@ -192,5 +192,3 @@ def early_iterations(demos: Demos, report: Report) -> int:
     soccer = isinstance(demos.environment, SoccerField)
     reported = FIGURE_12["unified"] if soccer else TABLE_1["unified"].mean
     return round(report.early * reported)
-
-

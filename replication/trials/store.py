@@ -36,7 +36,14 @@ Arrays = Mapping[str, NDArray[Any]]
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS trials (key TEXT PRIMARY KEY, record BLOB NOT NULL, snapshots BLOB)
 """
-_PLAIN = ("errors", "weights", "q", "collisions", "values", "rewards")  # the arrays that a trial has as they are
+_PLAIN = (
+    "errors",
+    "weights",
+    "q",
+    "collisions",
+    "values",
+    "rewards",
+)  # the arrays that a trial has as they are
 
 
 class DamagedTrialError(UserError):
