@@ -1,8 +1,17 @@
-"""Does rounding decide? The rule "Rounding" of the register, by which TIE-TOLERANCE was chosen."""
+"""Does rounding decide? The rule "Rounding" of the register, by which TIE-TOLERANCE was chosen.
+
+Along the correct path many values are equal on paper. The first update gives its pairs the weights
+c, c gamma, c gamma^2 and so on, a constant times the expert's discounted visits. From a state of the
+path an agent may walk to the next one and back for ever, or to the one before and back. The first
+way earns c gamma^t now; the second one earns gamma c gamma^(t-1) a step later, which is the same. As
+long as neighbouring pairs have this ratio, every such loop along the path is worth as much as the
+next, and which of them a greedy agent walks is left to ties, or to rounding.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -10,10 +19,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replication.demos.files import load_demos
+from replication.demos.maze_expert import Expert, demonstrate
+from replication.demos.model import Demos
+from replication.envs.maze import as_maze
 from replication.evidence.experiments import EXPERIMENTS, NONE, conditions_of
 from replication.evidence.statistics import holm, mean_interval, sign_flip_p
 from replication.files import resolve
 from replication.irl import METHODS
+from replication.learning.seeds import child
 from replication.paper.register import Value, load_choices
 from replication.trials.condition import Condition
 from replication.trials.table import Group
@@ -23,6 +36,10 @@ TRIALS = 100
 """Root seed and number of trials of each setting, tolerance and arithmetic."""
 
 LEVEL = 0.05
+
+CHOICES = {"alpha": 0.3, "f_start": 0.5, "ties": "random", "q_start": "kept"}
+LEG = 2
+"""The defaults at the time of the choice, DEMO-SHAPE last: so it can be checked later on."""
 
 PART = "rounding"
 """What the column `part` of the table of trials has."""
@@ -56,11 +73,16 @@ def conditions() -> dict[tuple[Setting, Value, Value], Condition]:
     found = {}
     for setting, (tolerance, arithmetic) in product(settings(), variants()):
         task, method, reading = setting
-        choices = {"tie_tolerance": tolerance, "arithmetic": arithmetic}
-        demos = load_demos(resolve(EXPERIMENTS[task].demos))
-        own = conditions_of(demos, choices, [method])
+        choices = {**CHOICES, "tie_tolerance": tolerance, "arithmetic": arithmetic}
+        own = conditions_of(_demos(task), choices, [method])
         found[setting, tolerance, arithmetic] = own[method, reading, NONE]
     return found
+
+
+@cache
+def _demos(task: str) -> Demos:
+    stored = load_demos(resolve(EXPERIMENTS[task].demos))
+    return demonstrate(task, as_maze(stored.environment), params=Expert(leg=LEG))
 
 
 def plan(trials: int) -> list[Group]:
@@ -129,3 +151,54 @@ def _grouped(
         counts = own.sort_values("trial")["iterations"].to_numpy(float)
         grouped.setdefault((setting, tolerance), {})[arithmetic] = counts
     return grouped
+
+
+# --- where rounding decides ----------------------------------------------------------------------
+
+PROFILED = 20
+"""Trials of which every Q-table is looked at."""
+
+NEAR = 1e-12
+"""Relative difference below which two values that are not equal differ by rounding alone."""
+
+
+def profile_table() -> pd.DataFrame:
+    """Return where along the open maze's path the greedy choice is left to a tie or to rounding.
+
+    Without a tolerance, over the Q-tables after each update of some trials.
+
+    Returns
+    -------
+    DataFrame
+        One row for each method and reading of Eq. 9, and each step of the path: `tied` is the share
+        of Q-tables in which its two best actions have equal values, `rounded` that in which they
+        differ by rounding alone.
+    """
+    rows = []
+    for task, method, reading in settings():
+        if task != "open-maze":
+            continue
+        condition = conditions()[(task, method, reading), 0.0, "double"]
+        path = condition.demos.correct[0].states[:-1]
+        gaps = np.concatenate([_gaps(condition, k, path) for k in range(PROFILED)])
+        for step, gap in enumerate(gaps.T):
+            rows.append(
+                {
+                    "method": method,
+                    "reading": reading,
+                    "step": step,
+                    "tables": len(gap),
+                    "tied": float((gap == 0).mean()),
+                    "rounded": float(((gap > 0) & (gap <= NEAR)).mean()),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _gaps(condition: Condition, k: int, states: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the relative gap between the two best values, [update, state], in trial k."""
+    trial = condition.trial(seed=child(np.random.SeedSequence(ROOT), k), keep=True)
+    assert trial.snapshots is not None
+    ordered = np.sort(trial.snapshots.q[1:, states], axis=2)
+    best, second = ordered[..., -1], ordered[..., -2]
+    return (best - second) / np.maximum(np.abs(best), np.finfo(float).tiny)
