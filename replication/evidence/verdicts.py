@@ -76,9 +76,8 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
         `effect` with its 95 % interval `low` to `high` is the claim's statistic, `paper` the
         published value of it. For published means and SDs, `predicted_low` to `predicted_high` is
         where ours should lie. `fewer` is the probability that x is below y in one trial each, ties
-        counting half; `power` that of finding an effect as large as the published one. `p_holm` is
-        adjusted over all tests of the table. `why` is empty for what is reproduced or reversed.
-        `criteria` is the hash of the frozen file.
+        counting half. `p_holm` is adjusted over all tests of the table. `why` is empty for what is
+        reproduced or reversed. `criteria` is the hash of the frozen file.
 
     Raises
     ------
@@ -169,7 +168,7 @@ def _row(claim: Claim, reading: str, measures: pd.DataFrame) -> dict[str, Any]:
         "capped": int((x["converged"] == 0).sum() + (claim.y != "") * (y["converged"] == 0).sum()),
         "paper": claim.paper_effect,
     }
-    counts = ("effect", "low", "high", "predicted_low", "predicted_high", "fewer", "p", "power")
+    counts = ("effect", "low", "high", "predicted_low", "predicted_high", "fewer", "p")
     return row | dict.fromkeys(counts, np.nan) | _numbers(claim, x, y)
 
 
@@ -185,14 +184,13 @@ def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]
     if claim.statistic in ("mean-difference", "mean"):
         shift = 0.0 if claim.y else claim.margin
         against = b if claim.y else np.full(len(a), shift)
-        result = compare(a, against, published=claim.paper_effect)
+        result = compare(a, against)
         return {
             "effect": result.difference + shift,
             "low": result.low + shift,
             "high": result.high + shift,
             "fewer": result.fewer if claim.y else np.nan,
-            "p": result.p_wilcoxon,
-            "power": result.power,
+            "p": result.p,
         }
     if claim.statistic == "sd-ratio":
         result = compare(a, b)

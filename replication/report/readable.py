@@ -102,7 +102,7 @@ def readable_contrasts(table: pd.DataFrame) -> pd.DataFrame:
             "Iterations [95 %]": lambda row: interval(row.difference, row.low, row.high),
             "SD × [95 %]": lambda row: interval(row.sd_ratio, row.sd_low, row.sd_high),
             "P(fewer)": lambda row: number(row.fewer),
-            "p, signed rank": lambda row: p_value(row.p_wilcoxon),
+            "p": lambda row: p_value(row.p),
             "p, spread": lambda row: p_value(row.p_spread),
         },
     )
