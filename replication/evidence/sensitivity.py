@@ -1,8 +1,8 @@
 """What the claims depend on: their effects under every declared specification.
 
-Effects and intervals are those of the claims; only the number of bootstrap samples is smaller. A
-trial at the iteration cap counts as that many iterations here, and the number of such trials is
-reported. One file because every table here is computed from that of the effects.
+Effects and intervals are those of the claims. A trial at the iteration cap counts as that many
+iterations here, and the number of such trials is reported. One file because every table here is
+computed from that of the effects.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from replication.evidence.specifications import (
     sort_key,
 )
 from replication.evidence.statistics import (
-    mean_intervals,
-    sd_ratio_intervals,
+    mean_interval,
+    sd_ratio_interval,
     share_interval,
     standard_errors,
 )
@@ -101,11 +101,11 @@ def effects_table(
 def _effects(claim: Claim, x: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return a claim's effect with its interval for each row of trials, [specification]."""
     if claim.statistic == "mean-difference":
-        return (x - y).mean(axis=1), *mean_intervals(x - y)
+        return (x - y).mean(axis=1), *mean_interval(x - y)
     if claim.statistic == "mean":
-        return x.mean(axis=1), *mean_intervals(x)
+        return x.mean(axis=1), *mean_interval(x)
     if claim.statistic == "sd-ratio":
-        return sd_ratio_intervals(x, y)
+        return sd_ratio_interval(x, y)
     assert claim.statistic == "share", f"{claim.id} has no effect under a specification"
     shares = np.minimum(x.mean(axis=1), y.mean(axis=1))
     n = x.shape[1]
@@ -215,9 +215,9 @@ def epsilon_squared(effects: pd.DataFrame) -> pd.DataFrame:
     factorial = effects[effects["group"] == "factorial"].dropna(subset="effect")
     for claim, part in factorial.groupby("claim", sort=False):
         bounds = part[["effect", "low", "high"]].to_numpy(float).T
-        if (part["statistic"] == "sd-ratio").any():
-            with np.errstate(divide="ignore"):  # an interval that reaches down to 0
-                bounds = np.log(bounds)
+        ratios = (part["statistic"] == "sd-ratio").any()
+        if ratios:
+            bounds = np.log(bounds)
         y, low, high = bounds
         total = float(((y - y.mean()) ** 2).sum())
         if total == 0:
@@ -231,7 +231,10 @@ def epsilon_squared(effects: pd.DataFrame) -> pd.DataFrame:
             without, _ = _residual([other for name, other in design.items() if name != id], y)
             shares[id] = (without - full - block.shape[1] * unexplained) / total
         known = np.isfinite(low) & np.isfinite(high)
-        error = float((standard_errors(low[known], high[known]) ** 2).mean()) if known.any() else 0
+        # Intervals of ratios are normal, those of means Student's.
+        of_t = np.inf if ratios else part["n"].to_numpy(float)[known] - 1
+        errors = standard_errors(low[known], high[known], of_t)
+        error = float((errors**2).mean()) if known.any() else 0
         noise = min(error * len(y) / total, 1.0)
         rest = 1.0 - sum(shares.values()) - noise
         rows += [

@@ -202,7 +202,8 @@ def spread_p(x: Array, y: Array) -> float:
         sums, squares = swapped.T
         one = squares_a + squares - (sum_a + sums) ** 2 / n
         other = squares_b - squares - (sum_b - sums) ** 2 / n
-        return np.abs(one - other) / (one + other)
+        # Swaps may leave nothing of both, which is equal.
+        return np.abs(one - other) / np.maximum(one + other, ROUNDING * (squares_a + squares_b))
 
     return _permutation_p(moved, statistic)
 

@@ -17,7 +17,7 @@ from replication.evidence.specifications import (
     load_specifications,
     single_specifications,
 )
-from replication.evidence.statistics import mean_intervals
+from replication.evidence.statistics import mean_interval
 from replication.evidence.tables import pairs_near
 from replication.evidence.variations import (
     Ablation,
@@ -148,7 +148,7 @@ def ablations_table(trials: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     first = trials.loc[trials["number"] == 0, "iterations"].to_numpy(float)
     for (number, method, reading), own in trials.groupby(["number", "method", "reading"]):
         counts = own["iterations"].to_numpy(float)
-        low, high = mean_intervals(np.stack([counts, counts - first]))
+        low, high = mean_interval(np.stack([counts, counts - first]))
         rows.append(
             {
                 "method": method,
@@ -194,7 +194,7 @@ def numbers_table(
     for (number, reading), condition in conditions.items():
         counts = own[number, reading]["iterations"].astype(float)
         saved = own[0, reading]["iterations"] - counts
-        low, high = mean_intervals(np.stack([counts, saved]))
+        low, high = mean_interval(np.stack([counts, saved]))
         near = pairs_near(condition.selected)
         rows.append(
             {

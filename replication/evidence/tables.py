@@ -86,9 +86,9 @@ def contrasts_table(trials: pd.DataFrame) -> pd.DataFrame:
     """Return each method compared with its baseline, trial by trial, under each reading of Eq. 9.
 
     One row a pair and reading, with everything in
-    :class:`replication.evidence.statistics.Comparison` but the power. These are effects with their
-    intervals; the verdicts on the paper's claims are those of
-    :mod:`replication.evidence.verdicts`, which also adjusts for the number of tests.
+    :class:`replication.evidence.statistics.Comparison`. These are effects with their intervals; the
+    verdicts on the paper's claims are those of :mod:`replication.evidence.verdicts`, which also
+    adjusts for the number of tests.
 
     Parameters
     ----------
@@ -103,7 +103,6 @@ def contrasts_table(trials: pd.DataFrame) -> pd.DataFrame:
             other = under(trials[trials["method"] == method.baseline], reading)
             if len(own) and len(other):
                 numbers = asdict(comparison(own, other))
-                del numbers["power"]
                 rows.append({"x": method.name, "y": method.baseline, "reading": reading, **numbers})
     return pd.DataFrame(rows)
 
@@ -142,7 +141,7 @@ def sets_table(trials: pd.DataFrame, conditions: Mapping[Key, Condition]) -> pd.
                 "difference": effect.difference,
                 "low": effect.low,
                 "high": effect.high,
-                "p": np.nan if kinds == "none" else effect.p_wilcoxon,
+                "p": np.nan if kinds == "none" else effect.p,
             }
         )
     table = pd.DataFrame(rows)

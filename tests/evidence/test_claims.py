@@ -28,7 +28,7 @@ from replication.evidence.claims import (
     short_label,
 )
 from replication.evidence.experiments import EXPERIMENTS
-from replication.evidence.statistics import CONFIDENCE, FEWEST
+from replication.evidence.statistics import CONFIDENCE
 from replication.evidence.tables import read_table
 from replication.files import PROJECT
 from replication.irl import METHODS, READINGS
@@ -246,10 +246,9 @@ def test_claim_can_be_judged(claim: Claim) -> None:
 
 
 def test_numbers_of_the_criteria_are_those_of_the_code() -> None:
-    """Confidence, fewest trials and readings are what the statistics and the notebooks use."""
+    """Confidence and readings are what the statistics and the notebooks use."""
     judging = load_claims().judging
     assert judging.confidence == CONFIDENCE
-    assert judging.fewest == FEWEST
     assert judging.level == pytest.approx(1 - CONFIDENCE)
     assert judging.readings == READINGS
     assert min(judging.trials.values()) >= judging.fewest

@@ -1,30 +1,45 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import astuple
+from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy import stats
 
 from replication.evidence import statistics
 from replication.evidence.statistics import (
-    FEWEST,
-    RESAMPLES_OF_MANY,
+    DETECTABLE,
+    EXACT,
     compare,
+    detectable,
+    effect_prediction,
+    equivalence_p,
     holm,
+    log_sd_ratio,
     mean_interval,
-    mean_intervals,
     mean_prediction,
-    power,
+    patterns,
+    published_difference_se,
+    published_log_sd_ratio_se,
+    relative_equivalence_p,
+    run_p,
     sd_interval,
     sd_prediction,
-    sd_ratio_intervals,
+    sd_ratio_interval,
     share_interval,
+    sign_flip_p,
+    spread_equivalence_p,
+    spread_p,
     standard_errors,
     summarise,
 )
+
+Array = NDArray[np.float64]
 
 COUNTS = st.lists(st.integers(0, 300), min_size=2, max_size=12)
 NAN = float("nan")
@@ -49,7 +64,7 @@ def test_capped_trials_are_never_averaged() -> None:
     assert (found.n, found.capped) == (5, 1)
     assert np.isnan([found.mean, found.low, found.high, found.sd]).all()
     assert (found.quartile_1, found.median, found.quartile_3) == (2.0, 3.0, 4.0)
-    compared = compare([1, 2, 300], [4, 5, 6], capped=True, published=-4.8)
+    compared = compare([1, 2, 300], [4, 5, 6], capped=True)
     assert np.isnan(astuple(compared)[:-1]).all()
     assert compared.n == 3
 
@@ -58,86 +73,177 @@ def test_capped_trials_are_never_averaged() -> None:
 
 
 def test_comparison_by_hand() -> None:
-    """Small samples worked out on paper: differences, pairs of trials, Welch's t, ratio of SDs."""
-    x, y = [1, 2, 3, 6], [2, 4, 6, 8]
+    """Small samples worked out on paper: differences, flips, pairs of trials, ratio of SDs."""
+    x, y = np.array([1.0, 2, 3, 6]), np.array([2.0, 4, 6, 8])
     found = compare(x, y)
     assert found.difference == -2.0
+    # All four differences have one sign: two of 2**4 assignments of signs are as extreme.
+    assert found.p == 2 / 16
     # Of 16 pairs, x is the smaller in 4 + 3 + 3 + 1 and equal in 0 + 1 + 0 + 1.
     assert found.fewer == (11 + 0.5 * 2) / 16
     assert found.sd_ratio == pytest.approx((14 / 3) ** 0.5 / (20 / 3) ** 0.5)
-    # t = -2 / sqrt(14/12 + 20/12), by Welch and Satterthwaite with 5.8235... degrees of freedom.
-    freedom = (14 / 12 + 20 / 12) ** 2 / ((14 / 12) ** 2 / 3 + (20 / 12) ** 2 / 3)
-    assert found.p_welch == pytest.approx(2 * stats.t.cdf(-2 / (34 / 12) ** 0.5, freedom))
-    # All four differences have one sign: two of 2**4 assignments of signs are as extreme.
-    assert found.p_wilcoxon == pytest.approx(2 / 16)
-    assert np.isnan(found.power)
-
-
-def test_spread_by_hand() -> None:
-    """Brown-Forsythe is the analysis of variance of the distances from the medians."""
-    x, y = [1, 2, 3, 4, 9], [0, 10, 20, 35, 50]
-    expected = stats.f_oneway([2, 1, 0, 1, 6], [20, 10, 0, 15, 30]).pvalue
-    assert compare(x, y).p_spread == pytest.approx(expected)
+    assert [found.low, found.high] == [*mean_interval(x - y)]
+    assert [found.sd_ratio, found.sd_low, found.sd_high] == [*sd_ratio_interval(x, y)]
+    assert (found.p_spread, found.n) == (spread_p(x, y), 4)
 
 
 @given(COUNTS)
 @settings(deadline=None, max_examples=8)
 def test_a_sample_does_not_differ_from_itself(x: list[int]) -> None:
     """Against itself a condition differs by 0, is fewer in half the pairs, and no test rejects."""
-    found = compare(x, x, published=-4.8)
+    found = compare(x, x)
     assert (found.difference, found.low, found.high, found.fewer) == (0.0, 0.0, 0.0, 0.5)
-    assert (found.p_welch, found.p_wilcoxon) == (1.0, 1.0)
+    assert found.p == 1.0
+    assert found.p_spread == 1.0 or len(set(x)) == 1
 
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(0, 300)), min_size=2, max_size=12))
 @settings(deadline=None, max_examples=8)
 def test_exchange_of_the_samples(pairs: list[tuple[int, int]]) -> None:
-    """Exchanged samples have the opposite difference and the same p-values, without a warning."""
+    """Exchanged samples have opposite differences and inverse ratios, and the same p-values."""
     x, y = zip(*pairs, strict=True)
     one, other = compare(x, y), compare(y, x)
     assert one.difference == -other.difference
+    assert (one.low, one.high) == pytest.approx((-other.high, -other.low))
     assert one.fewer == pytest.approx(1 - other.fewer)
-    for name in ("p_welch", "p_wilcoxon", "p_spread"):
-        assert getattr(one, name) == pytest.approx(getattr(other, name), nan_ok=True)
+    assert (one.p, one.p_spread) == pytest.approx((other.p, other.p_spread), nan_ok=True)
+    inverse = np.array([other.sd_ratio, other.sd_high, other.sd_low]) ** -1
+    assert [one.sd_ratio, one.sd_low, one.sd_high] == pytest.approx(inverse, nan_ok=True)
     assert one.low <= one.difference <= one.high
 
 
 def test_samples_that_do_not_spread() -> None:
     """Constant samples have no spread to compare, and a constant difference is its interval."""
-    found = compare([3, 3, 3], [4, 4, 4], published=-1.0)
+    found = compare([3, 3, 3], [4, 4, 4])
     assert (found.difference, found.low, found.high, found.fewer) == (-1.0, -1.0, -1.0, 1.0)
     assert np.isnan([found.sd_ratio, found.sd_low, found.sd_high, found.p_spread]).all()
-    assert np.isnan(found.power)
-    assert found.p_welch == 0.0
+    assert found.p == 2 / 8
 
 
-# --- intervals -------------------------------------------------------------------------------
+# --- means -----------------------------------------------------------------------------------
 
 
-@given(st.lists(st.integers(-50, 50), min_size=2, max_size=15))
-@settings(deadline=None, max_examples=25)
-def test_interval_contains_the_mean_and_never_changes(differences: list[int]) -> None:
-    """The interval of equal differences has equal bits, and the mean lies in it."""
-    sample = np.array(differences, dtype=float)
-    low, high = mean_interval(sample)
-    assert (low, high) == mean_interval(sample.copy())
-    assert sample.min() <= low <= sample.mean() <= high <= sample.max()
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+def test_intervals_of_means_are_those_of_scipy(confidence: float) -> None:
+    """Along the last axis, as SciPy's of each sample."""
+    samples = np.random.default_rng(1).exponential(3.0, (2, 3, 12))
+    low, high = mean_interval(samples, confidence=confidence)
+    expected = stats.ttest_1samp(samples, 0.0, axis=-1).confidence_interval(confidence)
+    np.testing.assert_allclose((low, high), (expected.low, expected.high))
+    np.testing.assert_allclose(
+        mean_interval(samples[1, 2], confidence=confidence), (low[1, 2], high[1, 2])
+    )
 
 
-def test_interval_is_that_of_students_t_for_a_normal_sample() -> None:
-    """On 200 normal numbers the bootstrap agrees with the textbook's interval to a few percent."""
-    sample = np.random.default_rng(1).normal(3.0, 10.0, 200)
-    half = stats.t.ppf(0.975, 199) * sample.std(ddof=1) / 200**0.5
-    low, high = mean_interval(sample)
-    assert low == pytest.approx(sample.mean() - half, abs=0.06 * half)
-    assert high == pytest.approx(sample.mean() + half, abs=0.06 * half)
+@pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.1, 40.0, 1 / 3]])
+def test_constant_rows_are_their_own_intervals(values: list[float]) -> None:
+    """A row that does not vary has its value as both bounds, whatever the other rows do."""
+    flat = np.repeat(np.array(values)[:, None], 10, axis=1)
+    noise = np.random.default_rng(6).normal(size=(1, 10))
+    low, high = mean_interval(np.concatenate([flat, noise]))
+    assert low[:3].tolist() == high[:3].tolist() == values
+    assert low[3] < noise.mean() < high[3]
 
 
-def test_interval_leans_to_the_longer_tail() -> None:
-    """Of a skewed sample, the interval reaches further on the side of the long tail."""
-    sample = np.array([0.0] * 30 + [5.0, 20.0, 40.0])
-    low, high = mean_interval(sample)
-    assert high - sample.mean() > 1.3 * (sample.mean() - low)
+@given(st.lists(st.integers(-30, 30), min_size=2, max_size=9), st.sampled_from([1.0, 0.1, 1 / 3]))
+@settings(deadline=None, max_examples=40)
+def test_sign_flips_are_those_of_scipy(values: list[int], unit: float) -> None:
+    """The exact p-value is that of SciPy for whole numbers, and the same in any unit."""
+    d = np.array(values, dtype=float)
+    expected = stats.permutation_test(
+        (d,), np.mean, permutation_type="samples", n_resamples=np.inf, vectorized=True
+    )
+    assert sign_flip_p(d) == pytest.approx(expected.pvalue)
+    assert sign_flip_p(unit * d) == sign_flip_p(d)
+
+
+def test_sign_flips_by_hand() -> None:
+    """Of 1, 2, 4 the sum 7 is the largest of 2^3; sums that tie but for rounding count as ties."""
+    assert sign_flip_p(np.array([1.0, 2, 4])) == 2 / 8
+    assert sign_flip_p(np.array([-1.0, 2, 4])) == 4 / 8
+    assert sign_flip_p(np.array([0.1, 0.2, -0.3])) == 1.0
+    assert sign_flip_p(np.zeros(5)) == sign_flip_p(np.zeros(50)) == 1.0
+
+
+def test_zeros_do_not_matter() -> None:
+    """A difference of zero is the same under each flip, so that few others stay exact."""
+    d = np.array([1.0, 2, 4])
+    assert sign_flip_p(np.concatenate([d, np.zeros(100)])) == sign_flip_p(d)
+
+
+def test_random_flips_are_near_the_exact_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With random patterns in place of all, p-values move by four standard errors at most."""
+    rng = np.random.default_rng(2)
+    d, x, y = rng.normal(0.4, 1, EXACT), rng.normal(0, 1, EXACT), rng.normal(0, 2, EXACT)
+    exact = sign_flip_p(d), spread_p(x, y)
+    monkeypatch.setattr(statistics, "EXACT", 0)
+    assert (sign_flip_p(d), spread_p(x, y)) == pytest.approx(exact, abs=0.006)
+    assert (sign_flip_p(d), spread_p(x, y)) != exact
+
+
+def test_p_values_do_not_depend_on_the_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are the same in every run, and another seed moves none by 0.005."""
+    rng = np.random.default_rng(3)
+    samples = [(rng.normal(0, 1, 60), rng.normal(shift, 1 + shift, 60)) for shift in (0.2, 0.4)]
+    pairs = [(sign_flip_p(x - y), spread_p(x, y)) for x, y in samples]
+    assert [(sign_flip_p(x - y), spread_p(x, y)) for x, y in samples] == pairs
+    monkeypatch.setattr(statistics, "FLIP_SEED", 1)
+    others = [(sign_flip_p(x - y), spread_p(x, y)) for x, y in samples]
+    assert others != pairs
+    np.testing.assert_allclose(others, pairs, atol=0.005)
+
+
+def test_random_p_values_do_not_depend_on_order() -> None:
+    """The trials may be numbered in another way, and the samples exchanged."""
+    rng = np.random.default_rng(17)
+    x, y = rng.integers(0, 20, (2, 60)).astype(float)
+    order = rng.permutation(60)
+    expected = sign_flip_p(x - y), spread_p(x, y)
+    assert (sign_flip_p((x - y)[order]), spread_p(x[order], y[order])) == expected
+    assert (sign_flip_p(y - x), spread_p(y, x)) == expected
+
+
+def test_random_p_values_are_never_zero() -> None:
+    """The trials as they are count as one of the patterns."""
+    assert sign_flip_p(np.arange(1.0, 200)) == 1 / (1 + statistics.FLIPS)
+
+
+def test_sign_flips_agree_with_t_for_a_large_sample() -> None:
+    """For 1,000 normal differences the p-value is that of Student's t."""
+    d = np.random.default_rng(4).normal(0.06, 1, 1000)
+    assert sign_flip_p(d) == pytest.approx(stats.ttest_1samp(d, 0).pvalue, abs=0.005)
+
+
+def test_patterns() -> None:
+    """Few are all different; many come in blocks, first the one without a flip, half flipped."""
+    (every,) = patterns(3)
+    assert {tuple(row) for row in every} == set(product((0.0, 1.0), repeat=3))
+    assert not every[0].any()
+    n = 2 * EXACT + 1
+    blocks = list(patterns(n))
+    assert max(map(np.size, blocks)) <= statistics.BLOCK
+    every = np.concatenate(blocks)
+    assert every.shape == (1 + statistics.FLIPS, n)
+    assert not every[0].any()
+    assert every.mean(axis=0) == pytest.approx(0.5, abs=0.01)
+    assert np.abs(np.corrcoef(every.T) - np.eye(n)).max() < 0.02
+
+
+def test_level_of_the_sign_flips() -> None:
+    """Without a difference on average, 5 % of skewed samples are rejected, give or take."""
+    d = np.random.default_rng(5).exponential(1.0, (1000, EXACT)) - 1
+    own = d - np.random.default_rng(6).exponential(1.0, (1000, EXACT)) + 1
+    assert np.mean([sign_flip_p(row) <= 0.05 for row in own]) == pytest.approx(0.05, abs=0.025)
+
+
+@pytest.mark.parametrize("n", [2, 30])
+def test_standard_errors_are_those_of_the_intervals(n: int) -> None:
+    """From an interval by t or by the normal distribution follows its standard error."""
+    sample = np.random.default_rng(7).normal(size=(3, n))
+    expected = sample.std(axis=1, ddof=1) / n**0.5
+    assert standard_errors(*mean_interval(sample), n - 1) == pytest.approx(expected)
+    s = np.array([0.5, 2.0])
+    assert standard_errors(3 - 1.959964 * s, 3 + 1.959964 * s) == pytest.approx(s)
 
 
 @pytest.mark.parametrize(("n", "m"), [(5, 100), (100, 100), (30, 5)])
@@ -230,114 +336,224 @@ def test_share_interval_inverts_the_binomial_test(n: int, data: st.DataObject) -
     assert share_interval(n - k, n) == pytest.approx((1 - high, 1 - low))
 
 
-# --- many intervals at once ------------------------------------------------------------------
-
-
-@pytest.fixture
-def resamples_of_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give single intervals as few resamples as those of many rows have."""
-    monkeypatch.setattr(statistics, "RESAMPLES", RESAMPLES_OF_MANY)
-
-
-@pytest.mark.usefixtures("resamples_of_many")
-def test_intervals_of_many_means_are_those_of_each() -> None:
-    """Row by row they are the BCa intervals of single samples, with the same resamples."""
-    rng = np.random.default_rng(3)
-    samples = np.array([rng.normal(0, 1, 12), rng.exponential(5, 12), rng.integers(0, 4, 12)])
-    low, high = mean_intervals(samples)
-    for row, bounds in zip(samples, zip(low, high, strict=True), strict=True):
-        assert bounds == pytest.approx(mean_interval(row), rel=1e-9, abs=1e-9)
-    alone = mean_intervals(samples[1:2])
-    assert (alone[0][0], alone[1][0]) == pytest.approx((low[1], high[1]))
-
-
-@pytest.mark.usefixtures("resamples_of_many")
-def test_intervals_of_many_ratios_are_those_of_each() -> None:
-    """Likewise for ratios of SDs, the pairs resampled together."""
-    x, y = np.random.default_rng(5).normal(40, [[[3]], [[8]]], (2, 4, FEWEST))
-    ratio, low, high = sd_ratio_intervals(x, y)
-    for at in range(4):
-        one = compare(x[at], y[at])
-        expected = one.sd_ratio, one.sd_low, one.sd_high
-        assert (ratio[at], low[at], high[at]) == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.1, 40.0, 1 / 3]])
-def test_constant_rows_are_their_own_intervals(values: list[float]) -> None:
-    """A row that does not vary has its value as both bounds, whatever the other rows do."""
-    flat = np.repeat(np.array(values)[:, None], 10, axis=1)
-    noise = np.random.default_rng(6).normal(size=(1, 10))
-    low, high = mean_intervals(np.concatenate([flat, noise]))
-    assert low[:3] == pytest.approx(values)
-    assert (low[:3] == high[:3]).all()
-    assert low[3] < noise.mean() < high[3]
-
-
-def test_ratio_to_a_constant_is_missing() -> None:
-    """Where y does not vary there is no ratio and no interval; the other rows keep theirs."""
-    rng = np.random.default_rng(7)
-    x, y = rng.normal(size=(2, 3, 12))
-    y[1] = 4.0
-    found = np.array(sd_ratio_intervals(x, y))
-    assert np.isnan(found[:, 1]).all()
-    assert np.isnan(np.array(sd_ratio_intervals(y, x))[:, 1]).all()
-    assert np.isfinite(found[:, [0, 2]]).all()
-    assert (found[1] <= found[0])[[0, 2]].all()
-    assert (found[0] <= found[2])[[0, 2]].all()
-
-
-def test_standard_errors_are_those_of_normal_intervals() -> None:
-    """An interval of an estimate with standard error s is 2 x 1.96 s wide."""
-    s = np.array([0.5, 2.0])
-    found = standard_errors(3.0 - stats.norm.ppf(0.975) * s, 3.0 + stats.norm.ppf(0.975) * s)
-    assert found == pytest.approx(s)
-
-
-# --- power -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("n", "effect"), [(10, 0.5), (30, 0.3), (100, -0.3)])
-def test_power_by_simulation(n: int, effect: float) -> None:
-    """The power is the share of simulated paired t-tests that reject."""
-    rng = np.random.default_rng(3)
-    draws = rng.normal(effect, 1.25, (10_000, n))
-    rejected = (stats.ttest_1samp(draws, 0.0, axis=1).pvalue < 0.05).mean()
-    assert power(1.25, n, effect) == pytest.approx(rejected, abs=0.02)  # four standard errors
-
-
-@pytest.mark.parametrize("n", [2, 10, 100])
-def test_power_rises_with_the_effect_to_one(n: int) -> None:
-    """From the level it rises to 1, whatever the sign; without effect or spread there is none."""
-    powers = [power(1.2, n, effect) for effect in np.linspace(0.0, 60.0, 241)]
-    assert np.diff(powers).min() >= -1e-12
-    assert powers[0] == pytest.approx(0.05)
-    assert powers[-1] > 0.99
-    assert np.isnan([power(1.2, n, NAN), power(0.0, n, 1.0)]).all()
-    assert power(1.2, n, -0.4) == power(1.2, n, 0.4)
-    assert power(1.2, n, 1e4) == pytest.approx(1.0)
-
-
 # --- ratios of SDs ---------------------------------------------------------------------------
 
 
-def test_few_trials_give_no_interval_of_a_ratio() -> None:
-    """Below 30 trials the ratio of SDs stands without an interval."""
-    sample = np.random.default_rng(4).normal(40.0, 5.0, (2, FEWEST))
-    assert np.isfinite(compare(*sample).sd_low)
-    few = compare(*sample[:, 1:])
-    assert np.isnan([few.sd_low, few.sd_high]).all()
-    assert np.isfinite(few.sd_ratio)
+def skewed_pairs(rng: np.random.Generator, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Draw correlated samples from gamma distributions, whose SDs are 2 and 4."""
+    shared = rng.gamma(2.0, 1.0, shape)
+    return shared + rng.gamma(2.0, 1.0, shape), 2 * (shared + rng.gamma(2.0, 1.0, shape))
 
 
-def test_ratio_of_sds_has_an_interval_that_knows_the_pairs() -> None:
-    """Of samples that are multiples of each other the ratio is exact; of noise it is wide."""
-    rng = np.random.default_rng(2)
-    sample = rng.normal(40.0, 5.0, 100)
-    exact = compare(2 * sample, sample)
-    assert (exact.sd_low, exact.sd_high) == pytest.approx((2.0, 2.0))
-    noise = compare(rng.normal(40.0, 10.0, 100), sample)
-    assert noise.sd_low < noise.sd_ratio < noise.sd_high
-    assert 1.4 < noise.sd_low < 2.0 < noise.sd_high < 3.0
+def test_ratio_of_sds_by_hand() -> None:
+    """Of [0, 1, 2, 3] over [0, 0, 2, 2] the ratio is sqrt(5 / 4), its variance worked out."""
+    x, y = np.array([0.0, 1, 2, 3]), np.array([0.0, 0, 2, 2])
+    # Squared distances 2.25, .25, .25, 2.25 over 5/3 and 1, 1, 1, 1 over 4/3: half the difference
+    # is .3, -.3, -.3, .3, with the variance .12.
+    log, se = log_sd_ratio(x, y)
+    assert (log, se) == pytest.approx((np.log(5 / 4) / 2, (0.12 / 4) ** 0.5))
+    expected = 1.25**0.5 * np.exp(1.959964 * np.array([0, -1, 1]) * 0.03**0.5)
+    assert sd_ratio_interval(x, y) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("n", "cover"), [(100, 0.93), (1000, 0.95)])
+def test_interval_of_a_ratio_of_sds_covers(n: int, cover: float) -> None:
+    """It holds the true ratio in 95 of 100 large samples that are skewed and correlated."""
+    x, y = skewed_pairs(np.random.default_rng(8), (3000, n))
+    _, low, high = sd_ratio_interval(x, y)
+    assert ((low <= 0.5) & (high >= 0.5)).mean() == pytest.approx(cover, abs=0.015)
+    log, se = log_sd_ratio(x, y)
+    assert se.mean() == pytest.approx(log.std(), rel=0.1)
+
+
+def test_interval_of_a_ratio_knows_the_pairs() -> None:
+    """Of samples that are multiples of each other the ratio is certain; in any unit the same."""
+    sample = np.random.default_rng(2).normal(40.0, 5.0, 100)
+    assert sd_ratio_interval(2 * sample, sample) == pytest.approx((2.0, 2.0, 2.0))
+    x, y = skewed_pairs(np.random.default_rng(9), (50,))
+    assert sd_ratio_interval(3 * x + 7, 3 * y - 1) == pytest.approx(sd_ratio_interval(x, y))
+
+
+def test_ratio_to_a_constant_is_missing() -> None:
+    """Where either does not vary there is no ratio, interval or test; other rows keep theirs."""
+    x, y = np.random.default_rng(7).normal(size=(2, 3, 12))
+    y[1] = 4.1
+    for found in (np.array(sd_ratio_interval(x, y)), np.array(sd_ratio_interval(y, x))):
+        assert np.isnan(found[:, 1]).all()
+        assert (np.diff(found[[1, 0, 2]][:, [0, 2]], axis=0) > 0).all()
+    assert np.isnan([spread_p(x[1], y[1]), spread_p(y[1], x[1])]).all()
+    assert np.isnan(spread_equivalence_p(x[1], y[1], 1.25))
+
+
+def slow_spread_p(x: Array, y: Array) -> float:
+    """Swap the centred values of pairs in every way, and compare the log ratios of the SDs."""
+    a, b = x - np.median(x), y - np.median(y)
+
+    def size(swaps: tuple[bool, ...]) -> float:
+        one, other = np.where(swaps, b, a), np.where(swaps, a, b)
+        if one.var() == other.var() == 0:
+            return 0.0
+        with np.errstate(divide="ignore"):
+            return float(abs(np.log(one.var()) - np.log(other.var())))
+
+    sizes = np.array([size(swaps) for swaps in product((False, True), repeat=len(a))])
+    return float((sizes >= sizes[0] - 1e-9).mean())
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 30)), min_size=2, max_size=7))
+@example([(0, 1), (1, 0)])
+@settings(deadline=None, max_examples=30)
+def test_swaps_by_definition(pairs: list[tuple[int, int]]) -> None:
+    """The exact p-value is that of all swaps, made one by one."""
+    x, y = np.array(pairs, dtype=float).T
+    if np.ptp(x) > 0 and np.ptp(y) > 0:
+        assert spread_p(x, y) == pytest.approx(slow_spread_p(x, y))
+
+
+def test_pairs_that_do_not_differ_are_not_swapped() -> None:
+    """They count in the SDs, but leave the others few enough to be exact."""
+    x, y = np.array([0.0, 9, 1, 7, 3]), np.array([1.0, 2, 0, 1, 2])
+    same = np.tile([-4.0, 4.0], 4)
+    found = spread_p(np.append(x - 3, same), np.append(y - 1, same))
+    assert found == pytest.approx(slow_spread_p(np.append(x - 3, same), np.append(y - 1, same)))
+    assert found * 2**5 == int(found * 2**5)
+    many = np.tile(same, 30)
+    found = spread_p(np.append(x - 3, many), np.append(y - 1, many))
+    assert found * 2**5 == int(found * 2**5)
+
+
+def test_level_and_power_of_the_swaps() -> None:
+    """Of skewed pairs with equal SDs about 5 % are rejected, with SDs 1 to 2 nearly all."""
+    x, y = skewed_pairs(np.random.default_rng(10), (500, EXACT))
+    rejected = [spread_p(a, b / 2) <= 0.05 for a, b in zip(x, y, strict=True)]
+    assert np.mean(rejected) == pytest.approx(0.05, abs=0.03)
+    x, y = skewed_pairs(np.random.default_rng(11), (10, 100))
+    assert max(spread_p(a, b) for a, b in zip(x, y, strict=True)) < 0.005
+
+
+# --- equivalence -----------------------------------------------------------------------------
+
+
+def test_equivalence_by_hand() -> None:
+    """For [-1, 0, 1, 2] and a margin of 2: t = 1.5 / (1.29099 / 2) with 3 degrees of freedom."""
+    d = np.array([-1.0, 0, 1, 2])
+    expected = stats.t.sf(1.5 / ((5 / 3) ** 0.5 / 2), 3)
+    assert equivalence_p(d, 2.0) == pytest.approx(expected)
+    assert equivalence_p(-d, 2.0) == pytest.approx(expected)
+    assert equivalence_p(d, 0.5) == pytest.approx(0.5)
+
+
+@given(st.lists(st.integers(-20, 20), min_size=3, max_size=20), st.floats(0.5, 20))
+@settings(deadline=None, max_examples=40)
+def test_equivalence_is_an_interval_within_the_margin(values: list[int], margin: float) -> None:
+    """P is below 5 % exactly where the 90 % interval lies within the margin (Schuirmann)."""
+    d = np.array(values, dtype=float)
+    low, high = mean_interval(d, confidence=0.9)
+    assert (equivalence_p(d, margin) < 0.05) == (-margin < low and high < margin)
+
+
+def test_relative_equivalence_by_hand() -> None:
+    """The contrasts x - .9 y and 1.1 y - x are tested each, and the worse p counts."""
+    rng = np.random.default_rng(12)
+    y = rng.normal(40, 5, 30)
+    x = 0.97 * y + rng.normal(0, 6, 30)
+    one = stats.ttest_1samp(x - 0.9 * y, 0, alternative="greater").pvalue
+    other = stats.ttest_1samp(x - 1.1 * y, 0, alternative="less").pvalue
+    assert relative_equivalence_p(x, y, 0.1) == pytest.approx(max(one, other))
+    assert relative_equivalence_p(3 * x, 3 * y, 0.1) == pytest.approx(max(one, other))
+
+
+def test_equivalence_of_spread_by_hand() -> None:
+    """The distance of |log ratio| from log 1.5, in standard errors, on the normal's tail."""
+    x, y = np.array([0.0, 1, 2, 3]), np.array([0.0, 0, 2, 2])  # as in the ratio by hand
+    expected = stats.norm.sf((np.log(1.5) - np.log(1.25) / 2) / 0.03**0.5)
+    assert spread_equivalence_p(x, y, 1.5) == pytest.approx(expected)
+    assert spread_equivalence_p(y, x, 1.5) == pytest.approx(expected)
+    assert spread_equivalence_p(x, y, 1.25**0.5) == pytest.approx(0.5)
+
+
+def test_equivalence_of_what_does_not_vary() -> None:
+    """A constant difference or a certain ratio is within the margin or is not."""
+    ones = np.ones(5)
+    assert (equivalence_p(ones, 1.5), equivalence_p(ones, 1.0), equivalence_p(-ones, 0.5)) == (
+        0.0,
+        1.0,
+        1.0,
+    )
+    assert relative_equivalence_p(41 * ones, 40 * ones, 0.05) == 0.0
+    assert relative_equivalence_p(43 * ones, 40 * ones, 0.05) == 1.0
+    assert relative_equivalence_p(0 * ones, 0 * ones, 0.05) == 1.0
+    sample = np.arange(5.0)
+    assert (spread_equivalence_p(sample, sample, 1.2)) == 0.0
+    assert (spread_equivalence_p(2 * sample, sample, 1.2)) == pytest.approx(1.0)
+
+
+BORDERS: dict[str, Callable[[Array, Array], float]] = {
+    "mean": lambda x, y: equivalence_p(x + 3 - y, 3.0),
+    "relative": lambda x, y: relative_equivalence_p(0.9 * x, y, 0.1),
+    "spread": lambda x, y: spread_equivalence_p(1.5 * x, y, 1.5),
+}
+
+
+@pytest.mark.parametrize("border", list(BORDERS))
+def test_level_of_the_equivalence_tests(border: str) -> None:
+    """Where the truth lies on the margin, 5 % are rejected, give or take."""
+    x, y = skewed_pairs(np.random.default_rng(13), (2000, 100))
+    rejected = [BORDERS[border](a, b / 2) <= 0.05 for a, b in zip(x, y, strict=True)]
+    assert np.mean(rejected) == pytest.approx(0.05, abs=0.025)
+
+
+# --- consistency with published numbers ------------------------------------------------------
+
+
+def test_detectable_effects_have_a_power_of_one_third() -> None:
+    """A two-sided z-test finds an effect of that size in a third of all studies."""
+    assert pytest.approx(1.5286, abs=1e-4) == DETECTABLE
+    z = np.random.default_rng(14).normal(detectable(0.3), 0.3, 100_000) / 0.3
+    assert (np.abs(z) > 1.959964).mean() == pytest.approx(1 / 3, abs=0.006)
+
+
+def test_detectable_effects_are_those_of_small_telescopes() -> None:
+    """Simonsohn's d33 of two groups of 20 or 100 is .5 or .2 by Student's t, a bit less here."""
+    for n in (20, 100):
+        d33 = detectable((2 / n) ** 0.5)
+        shift, critical = d33 * (n / 2) ** 0.5, stats.t.ppf(0.975, 2 * n - 2)
+        assert stats.nct.sf(critical, 2 * n - 2, shift) == pytest.approx(1 / 3, abs=0.02)
+
+
+def test_effect_prediction_covers() -> None:
+    """95 of 100 replications have their estimate within, given the paper's."""
+    rng = np.random.default_rng(15)
+    paper, ours = rng.normal(5, 0.4, 20_000), rng.normal(5, 0.3, 20_000)
+    low, high = effect_prediction(0.0, 0.4, 0.3)
+    assert (low, high) == pytest.approx((-1.959964 * 0.5, 1.959964 * 0.5))
+    inside = (paper + low <= ours) & (ours <= paper + high)
+    assert inside.mean() == pytest.approx(0.95, abs=0.007)
+
+
+def test_published_standard_errors_by_simulation() -> None:
+    """They are the SDs of differences of means, and of log ratios of SDs, of normal samples."""
+    rng = np.random.default_rng(16)
+    x, y = rng.normal(0, 3, (20_000, 40)), rng.normal(0, 4, (20_000, 60))
+    differences = x.mean(axis=1) - y.mean(axis=1)
+    assert published_difference_se(3, 40, 4, 60) == pytest.approx(differences.std(), rel=0.02)
+    logs = np.log(x.std(axis=1, ddof=1) / y.std(axis=1, ddof=1))
+    assert published_log_sd_ratio_se(40, 60) == pytest.approx(logs.std(), rel=0.02)
+
+
+@given(st.lists(st.integers(0, 20), min_size=1, max_size=20))
+def test_rank_of_a_published_run_is_exact(counts: list[int]) -> None:
+    """If any of our trials were the published one, at most a share p would have p or less."""
+    found = np.array([run_p(counts[:i] + counts[i + 1 :], counts[i]) for i in range(len(counts))])
+    assert all((found <= p + 1e-12).mean() <= p + 1e-12 for p in found)
+
+
+def test_rank_of_a_published_run_by_hand() -> None:
+    """Below all of 99 trials it is one of a hundred on one side; in the middle nothing is odd."""
+    counts = np.arange(1, 100)
+    assert run_p(counts, 0) == run_p(counts, 100) == 0.02
+    assert run_p(counts, 2) == pytest.approx(0.06)
+    assert run_p(counts, 50) == 1.0
 
 
 # --- Holm ------------------------------------------------------------------------------------

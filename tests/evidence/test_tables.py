@@ -103,7 +103,7 @@ def test_contrasts_are_paired_comparisons(conditions: dict[Key, Condition]) -> N
         assert other is not None
         x, y = (rows_of(trials, each)["iterations"] for each in (one, other))
         found = compare(x, y)
-        for name in ("difference", "low", "high", "fewer", "sd_ratio", "p_wilcoxon", "p_spread"):
+        for name in ("difference", "low", "high", "fewer", "sd_ratio", "p", "p_spread"):
             assert row[name] == getattr(found, name)
     against = table[table["y"] == "adaboost"].set_index("reading")["difference"]
     assert against["updated"] - against["printed"] == pytest.approx(100, abs=3)

@@ -61,7 +61,7 @@ def test_readable_summary_by_hand() -> None:
 def test_readable_contrasts_by_hand() -> None:
     """Methods have their labels, numbers their intervals, and small p-values no false digits."""
     contrasts = table(
-        "x y reading difference low high sd_ratio sd_low sd_high fewer p_wilcoxon p_spread",
+        "x y reading difference low high sd_ratio sd_low sd_high fewer p p_spread",
         (
             "unified",
             "adaboost",
