@@ -108,11 +108,12 @@ def judge_claims(measures: pd.DataFrame, claims: Claims) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `effect` with its 95 % interval `low` to `high` is the claim's statistic, `paper` the
-        published value of it. For published means and SDs, `predicted_low` to `predicted_high` is
-        where ours should lie. `fewer` is the probability that x is below y in one trial each, ties
-        counting half. `p_holm` is adjusted over all tests of the table. `why` is empty for what is
-        reproduced or reversed. `criteria` is the hash of the frozen file.
+        `effect` with its 95 % interval `low` to `high` is the claim's statistic, `margin` the
+        smallest effect of interest and `paper` the published one; ours is `consistent` with it if
+        it lies between `predicted_low` and `predicted_high`. `p` is that of the test of no effect,
+        `p_absent` that of equivalence within the margin; `p_holm` and `p_absent_holm` are adjusted
+        over the cells of the claim. `why` says what a verdict rests on where that is not in these
+        numbers. `criteria` is the hash of what was frozen.
 
     Raises
     ------
@@ -177,47 +178,21 @@ def _row(claim: Claim, reading: str, set: str, measures: pd.DataFrame) -> dict[s
         "n": len(both),
         "capped": capped,
     }
-    counts = ("effect", "low", "high", "predicted_low", "predicted_high", "fewer", "p")
-    return row | dict.fromkeys(counts, np.nan) | _numbers(claim, x, y)
-
-
-def _numbers(claim: Claim, x: pd.DataFrame, y: pd.DataFrame) -> dict[str, float]:
-    """Return the effect, its interval and whatever else the claim's statistic gives."""
-    a, b = x[claim.measure].to_numpy(float), y[claim.measure].to_numpy(float)
+    row |= dict.fromkeys(EMPTY, np.nan)
+    row |= {"p_holm": np.nan, "p_absent_holm": np.nan, "consistent": ""}
+    row["paper"] = claim.paper_effect
+    a, b = (rows[claim.measure].to_numpy(float) for rows in (x, y))
     if claim.statistic == "share":
         share, n = min((values.mean(), len(values)) for values in (a, b))
         low, high = share_interval(round(share * n), n)
-        return {"effect": share, "low": low, "high": high}
-    if not (x["converged"].all() and y["converged"].all()):  # at the cap there is no count
-        return {}
-    if claim.statistic in ("mean-difference", "mean"):
-        shift = 0.0 if claim.y else claim.margin
-        against = b if claim.y else np.full(len(a), shift)
-        result = compare(a, against)
-        return {
-            "effect": result.difference + shift,
-            "low": result.low + shift,
-            "high": result.high + shift,
-            "fewer": result.fewer if claim.y else np.nan,
-            "p": result.p,
-        }
-    if claim.statistic == "sd-ratio":
-        result = compare(a, b)
-        bounds = {"low": result.sd_low, "high": result.sd_high}
-        return {"effect": result.sd_ratio, **bounds, "p": result.p_spread}
-    ours = summarise(a, x["converged"])
-    if claim.statistic == "published-run":
-        low, high = np.quantile(a, [0.025, 0.975])
-        return {"effect": ours.median, "low": float(low), "high": float(high)}
-    paper = claim.published(claim.x)
-    if claim.statistic == "published-mean":
-        low, high = mean_prediction(paper.mean, paper.sd, paper.n, ours.n)
-        moments = {"effect": ours.mean, "low": ours.low, "high": ours.high}
-    else:
-        low, high = sd_prediction(paper.sd, paper.n, a)
-        sd_low, sd_high = sd_interval(a)
-        moments = {"effect": ours.sd, "low": sd_low, "high": sd_high}
-    return moments | {"predicted_low": low, "predicted_high": high}
+        return row | {"effect": share, "low": low, "high": high, "margin": claim.margin}
+    if capped:  # at the cap there is no count
+        return row
+    numbers = _NUMBERS[claim.statistic](claim, a, b)
+    if not np.isnan(numbers.get("predicted_low", np.nan)):
+        inside = numbers["predicted_low"] <= numbers["effect"] <= numbers["predicted_high"]
+        row["consistent"] = "yes" if inside else "no"
+    return row | numbers
 
 
 def _saved(claim: Claim, x: Array, y: Array) -> dict[str, float]:
