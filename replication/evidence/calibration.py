@@ -1,4 +1,4 @@
-"""The rule "Calibrated" of the register: defaults from one published pair of numbers, in two stages.
+"""The rule "Calibrated" of the register: defaults from one published pair, in two stages.
 
 Five choices that every run behind Table I must have made are not in the text. Their defaults are
 the values under which the unified method without incorrect demonstrations comes nearest to its

@@ -20,14 +20,14 @@ FLIPS = 9_999
 
 @dataclass(frozen=True)
 class Joint:
-    """Many specifications, tested together. The claimed side is below zero.
+    """Many specifications, tested together. The claimed side is above zero.
 
     Attributes
     ----------
     median, p_median
         Median over specifications of the mean difference, and the two-sided p-value.
     significant, p_significant
-        Number of specifications whose mean difference is below zero by a t-test at 2.5 %, and the
+        Number of specifications whose mean difference is above zero by a t-test at 2.5 %, and the
         probability of so many without any effect.
     p_familywise
         P-value of each specification, two-sided, adjusted for all of them, [specification].
@@ -64,7 +64,7 @@ def joint_test(differences: Array) -> Joint:
     critical = t / np.sqrt(n - 1 + t**2)
 
     median = np.median(means, axis=1)
-    significant = (scores < -critical).sum(axis=1)
+    significant = (scores > critical).sum(axis=1)
     largest = np.abs(scores).max(axis=1)
     low, high = np.quantile(
         np.sort(means, axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], axis=0

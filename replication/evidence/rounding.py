@@ -1,11 +1,11 @@
 """Does rounding decide? The rule "Rounding" of the register, by which TIE-TOLERANCE was chosen.
 
 Along the correct path many values are equal on paper. The first update gives its pairs the weights
-c, c gamma, c gamma^2 and so on, a constant times the expert's discounted visits. From a state of the
-path an agent may walk to the next one and back for ever, or to the one before and back. The first
-way earns c gamma^t now; the second one earns gamma c gamma^(t-1) a step later, which is the same. As
-long as neighbouring pairs have this ratio, every such loop along the path is worth as much as the
-next, and which of them a greedy agent walks is left to ties, or to rounding.
+c, c gamma, c gamma^2 and so on, a constant times the expert's discounted visits. From a state of
+the path an agent may walk to the next one and back for ever, or to the one before and back. The
+first way earns c gamma^t now; the second earns gamma c gamma^(t-1) a step later, which is the same.
+As long as neighbouring pairs have this ratio, every such loop along the path is worth as much as
+the next, and which of them a greedy agent walks is left to ties, or to rounding.
 """
 
 from __future__ import annotations

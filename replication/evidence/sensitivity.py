@@ -14,6 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from replication.evidence.claims import Claim
+from replication.evidence.joint import joint_test
 from replication.evidence.specifications import (
     DEFAULT,
     Specification,
@@ -48,9 +49,15 @@ def effects_table(
 ) -> pd.DataFrame:
     """Return one row for each claim and specification: the effect, its interval, its outcome.
 
-    A share (errors that reach zero) holds where it is above the margin itself: so few trials give
+    An effect holds where its interval lies beyond no effect (`neutral`) on the claimed side. A
+    share (errors that reach zero) holds where it is above the margin itself: so few trials give
     no interval that could be. `capped` counts the trials at the iteration cap of all methods of the
     claim, `capped_x` those of its first.
+
+    What is saved is also tested jointly, over all specifications of a group, see
+    :func:`replication.evidence.joint.joint_test`: `p_family` is the adjusted p-value of each,
+    `null_low` to `null_high` where an effect of its rank lies with 95 % without any effect, and
+    `p_median` and `p_holds` the joint p-values of the median and of the number that hold.
 
     Parameters
     ----------
@@ -81,27 +88,57 @@ def effects_table(
             for method in methods
         }
         bounds = _effects(claim, x, y)
+        groups = np.array([name.group for name in names])
         columns = {
             "claim": claim.id,
             "statistic": claim.statistic,
             "measure": claim.measure,
-            "margin": claim.margin,
-            "group": [name.group for name in names],
+            "neutral": neutral(claim),
+            "group": groups,
             "specification": [name.name for name in names],
             "n": x.shape[1],
             "capped": np.sum(list(capped.values()), axis=0),
             "capped_x": capped[claim.x],
             **dict(zip(("effect", "low", "high"), bounds, strict=True)),
             "outcome": [_outcome(claim, *row) for row in zip(*bounds, strict=True)],
+            **dict.fromkeys(JOINT, np.nan),
         }
-        parts.append(pd.DataFrame(columns))
+        part = pd.DataFrame(columns)
+        for group in dict.fromkeys(groups) if claim.statistic == "saved" else ():
+            own = groups == group
+            part.loc[own, list(JOINT)] = _joint(y[own] - x[own])
+        parts.append(part)
     return pd.concat(parts, ignore_index=True)
+
+
+JOINT = ("p_family", "null_low", "null_high", "p_median", "p_holds")
+"""The columns of the joint test."""
+
+
+def _joint(saved: Array) -> Array:
+    """Return the columns of the joint test, [specification, column], given [specification, trial].
+
+    The band of the null hypothesis is that of the effect with the same rank.
+    """
+    test = joint_test(saved)
+    rank = np.argsort(np.argsort(saved.mean(axis=1), kind="stable"), kind="stable")
+    whole = np.broadcast_to([test.p_median, test.p_significant], (len(saved), 2))
+    band = np.column_stack([test.null_low[rank], test.null_high[rank]])
+    return np.column_stack([test.p_familywise, band, whole])
+
+
+def neutral(claim: Claim) -> float:
+    """Return what a claim's statistic is without any effect; of a share, its margin."""
+    if claim.statistic == "share":
+        assert claim.margin is not None
+        return claim.margin
+    return float(claim.statistic == "sd-ratio")
 
 
 def _effects(claim: Claim, x: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return a claim's effect with its interval for each row of trials, [specification]."""
-    if claim.statistic == "mean-difference":
-        return (x - y).mean(axis=1), *mean_interval(x - y)
+    if claim.statistic == "saved":
+        return (y - x).mean(axis=1), *mean_interval(y - x)
     if claim.statistic == "mean":
         return x.mean(axis=1), *mean_interval(x)
     if claim.statistic == "sd-ratio":
@@ -116,12 +153,13 @@ def _effects(claim: Claim, x: Array, y: Array) -> tuple[Array, Array, Array]:
 def _outcome(claim: Claim, effect: float, low: float, high: float) -> str:
     if np.isnan(effect):
         return UNDEFINED
+    even = neutral(claim)
     if claim.statistic == "share":
-        return HOLDS if effect > claim.margin else REVERSED if high < claim.margin else OPEN
-    below, above = high < claim.margin, low > claim.margin
+        return HOLDS if effect > even else REVERSED if high < even else OPEN
+    below, above = high < even, low > even
     if not (below or above):
         return OPEN
-    return HOLDS if below == (claim.direction == "less") else REVERSED
+    return HOLDS if below == (claim.statistic == "sd-ratio") else REVERSED
 
 
 # --- outcomes ------------------------------------------------------------------------------------

@@ -210,7 +210,7 @@ def parse_specifications(text: str) -> Declared:
 def _check_claim(id: str, task: str) -> None:
     """Refuse a claim of another task, or one that has no effect under a specification."""
     claim = load_claims().by_id(id)
-    if claim.direction == "inside":
+    if claim.is_published:
         raise ClaimError(f"{id} is about a published number; name claims that compare")
     if claim.task != task:
         raise ClaimError(f"{id} is about the task {claim.task!r}; name claims about {task!r}")

@@ -26,6 +26,7 @@ from replication.evidence.variations import (
     numbered_conditions,
     soccer_conditions,
 )
+from replication.irl import get_method
 from replication.trials.condition import Condition
 from replication.trials.table import Group
 
@@ -127,7 +128,7 @@ def ablations(trials: pd.DataFrame) -> pd.DataFrame:
 
 def numbers(trials: pd.DataFrame) -> pd.DataFrame:
     """Return what ever more incorrect demonstrations save."""
-    paper = -load_claims().by_id("SAVES-OPEN").paper_effect
+    paper = load_claims().by_id("SAVES-OPEN").paper_effect
     return numbers_table(trials[trials["part"] == "numbers"], _numbered(), paper=paper)
 
 
@@ -193,7 +194,8 @@ def numbers_table(
     }
     for (number, reading), condition in conditions.items():
         counts = own[number, reading]["iterations"].astype(float)
-        saved = own[0, reading]["iterations"] - counts
+        base = own[0, get_method("unified").under(reading)]
+        saved = base["iterations"] - counts
         low, high = mean_interval(np.stack([counts, saved]))
         near = pairs_near(condition.selected)
         rows.append(

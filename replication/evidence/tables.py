@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from replication.demos.model import Demos
 from replication.envs.maze import Maze
 from replication.evidence.experiments import Key, under
-from replication.evidence.statistics import Comparison, compare, holm, mean_prediction, summarise
+from replication.evidence.statistics import Comparison, compare, mean_prediction, summarise
 from replication.files import read_file, write_file
 from replication.irl import METHODS, Trial
 from replication.irl.expectations import visited
@@ -52,103 +52,134 @@ def means_table(trials: pd.DataFrame) -> pd.DataFrame:
     return means.round(2).astype({"steps": int}).reset_index()
 
 
+FIRST = 100
+"""As many trials as the paper has: they are shown beside all of ours."""
+
+
 def summary_table(trials: pd.DataFrame, published: Mapping[str, Published]) -> pd.DataFrame:
     """Return our iterations beside the published ones (Tables I and II).
 
     The prediction interval says where the mean of a replication with as many trials as ours should
-    lie if it drew from the paper's distribution; `p_paper` is Welch's test of equal means.
+    lie if it drew from the paper's distribution. `first_mean` and `first_sd` are those of the first
+    trials alone, as many as the paper has.
 
     Parameters
     ----------
     trials
-        The trials of one condition for each method and reading of Eq. 9: each gets a row.
+        The trials of one condition for each method, reading of Eq. 9 and set: each gets a row.
     published
         By method.
     """
     rows = []
-    for (method, reading), own in trials.groupby(["method", "reading"], sort=False):
+    for (method, reading, set), own in trials.groupby(["method", "reading", "set"], sort=False):
         ours = summarise(own["iterations"], own["converged"])
-        row = {"method": method, "reading": reading, **asdict(ours)}
+        first = own[own["trial"] < FIRST]
+        few = summarise(first["iterations"], first["converged"])
+        row = {"method": method, "reading": reading, "set": set, **asdict(ours)}
+        row |= {"first_mean": few.mean, "first_sd": few.sd}
         if method in published:
             paper = published[method]
             row |= {"paper_mean": paper.mean, "paper_sd": paper.sd}
             if paper.n > 1:
                 low, high = mean_prediction(paper.mean, paper.sd, paper.n, ours.n)
-                test = stats.ttest_ind_from_stats(
-                    ours.mean, ours.sd, ours.n, paper.mean, paper.sd, paper.n, equal_var=False
-                )
-                row |= {"predicted_low": low, "predicted_high": high, "p_paper": test.pvalue}
+                row |= {"predicted_low": low, "predicted_high": high}
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def contrasts_table(trials: pd.DataFrame) -> pd.DataFrame:
-    """Return each method compared with its baseline, trial by trial, under each reading of Eq. 9.
+    """Return what each method saves against its baseline, trial by trial.
 
-    One row a pair and reading, with everything in
-    :class:`replication.evidence.statistics.Comparison`. These are effects with their intervals; the
-    verdicts on the paper's claims are those of :mod:`replication.evidence.verdicts`, which also
-    adjusts for the number of tests.
+    One row a pair, reading of Eq. 9 and set: everything in
+    :class:`replication.evidence.statistics.Comparison`, `saved` being what the first method needs
+    less, and `steps_saved`, the steps in the environment that it saves as a share of the other's.
+    The verdicts on the paper's claims are those of :mod:`replication.evidence.verdicts`.
 
     Parameters
     ----------
     trials
-        The trials of one condition for each method and reading; a method that is not there is not
-        compared.
+        The trials of one condition for each method, reading and set; a method that is not there is
+        not compared.
     """
     rows = []
     for method in METHODS.values():
-        for reading in method.readings:
-            own = trials[(trials["method"] == method.name) & (trials["reading"] == reading)]
-            other = under(trials[trials["method"] == method.baseline], reading)
-            if len(own) and len(other):
-                numbers = asdict(comparison(own, other))
-                rows.append({"x": method.name, "y": method.baseline, "reading": reading, **numbers})
+        own = trials[trials["method"] == method.name]
+        for (reading, set), x in own.groupby(["reading", "set"], sort=False):
+            y = under(trials[trials["method"] == method.baseline], str(reading))
+            if len(y):
+                names = {"x": method.name, "y": method.baseline, "reading": reading, "set": set}
+                rows.append(names | _saved(x, y))
     return pd.DataFrame(rows)
+
+
+def _saved(x: pd.DataFrame, y: pd.DataFrame) -> dict[str, Any]:
+    """Return what the first of two conditions saves, over the trials of both."""
+    both = x.merge(y, on="trial").sort_values("trial")
+    effect = asdict(comparison(x, y))
+    low, high = 0 - effect.pop("high"), 0 - effect.pop("low")
+    steps = 1 - both["steps_x"].sum() / both["steps_y"].sum()
+    saved = 0 - effect.pop("difference")
+    return {"saved": saved, "low": low, "high": high, "steps_saved": steps, **effect}
 
 
 def sets_table(trials: pd.DataFrame, conditions: Mapping[Key, Condition]) -> pd.DataFrame:
     """Return one row for each set of incorrect demonstrations and reading of Eq. 9.
 
-    Beside the difference from no incorrect demonstrations stand the numbers of pairs by their
-    distance from the correct path, see :func:`pairs_near`. Only trials that were run with every
-    set count; p-values are adjusted over all rows.
+    Beside what the set saves stand the numbers of pairs by their distance from the correct path,
+    see :func:`pairs_near`, and how often line 12 of Algorithm 2 acts in a trial: in the first
+    trajectory, which is a random walk, and in all later ones.
 
     Parameters
     ----------
     trials
         A table with the trials of all conditions.
     conditions
-        Those of :func:`replication.evidence.experiments.set_conditions`.
+        By method, reading and set; only those with incorrect demonstrations get a row.
     """
-    rows_by_key = {key: rows_of(trials, condition) for key, condition in conditions.items()}
-    n = min(map(len, rows_by_key.values()))
+    shown = {key: each for key, each in conditions.items() if each.rule.uses_incorrect}
+    order = {key: len(each.selected.incorrect) for key, each in shown.items()}
     rows = []
-    for (kinds, reading), condition in conditions.items():
-        own = rows_by_key[kinds, reading].head(n)
-        effect = comparison(own, rows_by_key["none", reading])
-        ours = summarise(own["iterations"], own["converged"])
+    for key in sorted(shown, key=lambda key: (order[key], key[2])):
+        condition, (_, reading, set) = shown[key], key
+        own = rows_of(trials, condition)
+        base = under(trials[trials["method"] == condition.rule.baseline], reading)
         rows.append(
             {
-                "set": kinds,
+                "set": set,
                 "reading": reading,
-                "method": condition.method,
-                "demonstrations": len(condition.selected.incorrect),
+                "demonstrations": order[key],
                 **pairs_near(condition.selected),
-                "n": n,
-                "mean": ours.mean,
-                "sd": ours.sd,
-                "difference": effect.difference,
-                "low": effect.low,
-                "high": effect.high,
-                "p": np.nan if kinds == "none" else effect.p,
+                "acted_at_first": own["acted_at_first"].mean(),
+                "acted": own["acted"].mean(),
+                **_saved(own, base),
             }
         )
-    table = pd.DataFrame(rows)
-    table["p_holm"] = np.nan
-    judged = table["set"] != "none"
-    table.loc[judged, "p_holm"] = holm(table.loc[judged, "p"].tolist())
-    return table
+    return pd.DataFrame(rows)
+
+
+def kinds_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return how often wrong trajectories take a pair of each kind of incorrect demonstration.
+
+    One row for each kind and reading of Eq. 9, over all trajectories that are not the expert's but
+    the first ones, which are random walks; methods that are not given incorrect demonstrations.
+    """
+    kinds = [name for name in trials if str(name).startswith("with_")]
+    own = trials[(trials["method"] == "unified") & (trials["converged"] == 1)]
+    rows = []
+    for reading, part in own.groupby("reading", sort=False):
+        wrong = int((part["iterations"] - 1).sum())
+        for name in kinds:
+            taken = int(part[name].sum())
+            rows.append(
+                {
+                    "reading": reading,
+                    "kind": str(name).removeprefix("with_"),
+                    "trajectories": wrong,
+                    "taken": taken,
+                    "share": taken / wrong if wrong else np.nan,
+                }
+            )
+    return pd.DataFrame(rows)
 
 
 def pairs_near(demos: Demos) -> dict[str, int]:

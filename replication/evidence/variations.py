@@ -191,7 +191,7 @@ def numbered_conditions(ablations: Ablations, cap: int) -> dict[tuple[int, str],
     """
     demos = _maze_demos("open", Expert())
     every = _each_wrong_pair(demos, np.random.SeedSequence(ablations.seed))
-    conditions = {}
+    conditions: dict[tuple[int, str], Condition] = {}
     for number in ablations.numbers:
         n = len(every) if number == "all" else number
         shown = replace(demos, incorrect=tuple(every[:n]))

@@ -202,8 +202,8 @@ def _saved(claim: Claim, x: Array, y: Array) -> dict[str, float]:
     if claim.fraction is not None:
         margin = claim.fraction * y.mean()
         return row | {"margin": margin, "p_absent": relative_equivalence_p(x, y, claim.fraction)}
-    moments = [number for name in (claim.x, claim.y) for number in claim.paper[name][1:]]
-    se = published_difference_se(*moments)
+    (_, sd_x, n_x), (_, sd_y, n_y) = claim.paper[claim.x], claim.paper[claim.y]
+    se = published_difference_se(sd_x, n_x, sd_y, n_y)
     margin = detectable(se) if claim.margin is None else claim.margin
     row |= {"margin": margin, "p_absent": equivalence_p(d, margin)}
     if np.isnan(se):

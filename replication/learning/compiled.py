@@ -13,19 +13,20 @@ nothing follows: added to a number neither shows, and 0 and -0 as targets give t
 
 Every step still takes its draw and moves on, so streams and numbers of steps stay as they are. For
 that, each state has a row in a table. The entry of an action says where the row of its successor
-begins if the pair is frozen, plus 1 if the pair stays where it is, or else THAWED. After the actions
-come SLOTS entries for the greedy choice: copies of the entries of the tied actions, each as often as the others, or all THAWED. Of k
-tied actions, a draw x in [0, 1) takes number floor(k x); slot floor(SLOTS x) belongs to the same
-one if k divides SLOTS. They are filled when the choice was computed, and become THAWED with each
-change of the state's values and each thawing of one of its pairs. So whatever entry is found, it
-leads to where a computed step would lead, and a frozen step is a draw and a look at one entry.
+begins if the pair is frozen, plus 1 if that is the state itself, or else THAWED. After the actions
+come SLOTS entries for the greedy choice: copies of the entries of the tied actions, each as often
+as the others, or all THAWED. Of k tied actions, a draw x in [0, 1) takes number floor(k x); slot
+floor(SLOTS x) belongs to the same one if k divides SLOTS. They are filled when the choice was
+computed, and become THAWED with each change of the state's values and each thawing of one of its
+pairs. So whatever entry is found, it leads to where a computed step would lead, and a frozen step
+is a draw and a look at one entry.
 
 This is one file because numba renews its cache on disk only when the file of the cached function
 changes: a compiled function must not call what is compiled from another file.
 """
 
 # Numba infers the types of compiled functions.
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, var-annotated"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, var-annotated, call-arg"
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

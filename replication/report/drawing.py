@@ -19,19 +19,24 @@ from replication.report.readable import F_LABELS
 
 OUTCOMES = {HOLDS: "#0072B2", OPEN: "#9A9A9A", REVERSED: "#D55E00"}
 MARKS = {HOLDS: "o", OPEN: "s", REVERSED: "D"}
-READING_MARKS = {"printed": ("o", "#222222"), "updated": ("s", "#009E73"), "": ("o", "#222222")}
+READING_MARKS = {
+    "printed": ("o", "#222222"),
+    "updated": ("s", "#009E73"),
+    "at-once": ("D", "#CC79A7"),
+    "": ("o", "#222222"),
+}
 SMALL = 6.8
 
 FAR = 8
 """How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""
 
 UNITS = {
-    ("mean-difference", "iterations"): "difference in iterations",
-    ("mean-difference", "early_errors"): "difference in erroneous motions",
+    ("saved", "iterations"): "iterations saved",
+    ("saved", "early_collisions"): "collisions spared",
+    ("saved", "early_errors"): "erroneous motions spared",
     ("sd-ratio", "iterations"): "ratio of SDs",
     ("mean", "q_growth"): "growth of Q",
-    ("mean", "q_slope"): "rank correlation",
-    ("mean", "reward_slope"): "rank correlation",
+    ("mean", "reward_growth"): "growth of the reward",
     ("share", "converged"): "share of trials at zero",
 }
 """The unit of a comparative claim's effect, by its statistic and its measure."""

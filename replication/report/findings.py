@@ -5,14 +5,15 @@ One file because it is prose: each part is short, and none computes what a table
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from replication.evidence.calibration import CALIBRATED, PAIR, grid
+from replication.evidence.calibration import TRACE, WORLD, nearest, rule_follows
 from replication.evidence.claims import Claims, criteria_hash, load_claims, short_label
+from replication.evidence.rounding import LEVEL, chosen_tolerance
 from replication.evidence.sensitivity import (
     HOLDS,
     OPEN,
@@ -24,9 +25,9 @@ from replication.evidence.sensitivity import (
     unchanged,
 )
 from replication.evidence.specifications import DEFAULT, named_choices
-from replication.evidence.statistics import mean_prediction
 from replication.irl import METHODS
-from replication.report.readable import F_LABELS
+from replication.paper.register import load_choices
+from replication.report.readable import F_LABELS, full_label
 
 MATTERS = 0.05
 """Share of the variance from which on a choice is named in words."""
@@ -56,68 +57,87 @@ def caveats(claims: Claims, trials: pd.DataFrame) -> str:
     lines += [
         "",
         f"The judging run has root seed {claims.judging.root_seed}; these trials have root seed "
-        f"{seeds}. The hash of the criteria is `{criteria_hash()[:16]}`. Runs whose outcome was "
-        "known when the criteria were frozen:",
+        f"{seeds}. The hash of the criteria is `{criteria_hash()[:16]}`. What was known when they "
+        "were frozen:",
         "",
     ]
-    for run in claims.explored:
-        plural = "s" if len(run.root_seeds) > 1 else ""
-        lines.append(f"- Root seed{plural} {', '.join(map(str, run.root_seeds))}: {run.what}")
+    for known in claims.known:
+        seeds = ", ".join(map(str, known.root_seeds))
+        plural = "s" if len(known.root_seeds) > 1 else ""
+        lines.append(f"- {known.what}{f' (root seed{plural} {seeds})' if seeds else ''}")
     return "\n".join(lines)
+
+
+# --- below the experiment on rounding ------------------------------------------------------------
+
+
+def rounded(table: pd.DataFrame) -> str:
+    """Return in words which tolerance the rule takes, and what hangs on rounding without one.
+
+    `table` is that of :func:`replication.evidence.rounding.rounding_table`.
+    """
+    taken, default = chosen_tolerance(table), load_choices()["TIE-TOLERANCE"].default
+    others = table[table["arithmetic"] != "double"]
+    none = others[others["tolerance"] == 0]
+    most = none.loc[none["difference"].abs().idxmax()]
+    same = others[(others["arithmetic"] == "fused") & (others["tolerance"] > 0)]["equal"].min()
+    failing = [f"{t:g}" for t, rows in others.groupby("tolerance") if rows["p_holm"].min() < LEVEL]
+    rule = "which is our default" if taken == default else f"NOT our default of {default:g}"
+    return (
+        f"Without a tolerance the mean changes by up to {abs(most.difference):.1f} iterations "
+        f"({full_label(most.method, most.reading)}, {most.arithmetic}, {most.task}). With any of "
+        f"the tolerances at least {same:.0%} of the trials of a setting have the same number of "
+        f"iterations in double and fused arithmetic. A difference is shown at a tolerance of "
+        f"{', '.join(failing) or 'none'}. The least tolerance at which none is shown is "
+        f"{taken:g}, {rule}. In single precision values differ by more than small tolerances, so "
+        "that agreement trial by trial begins at 1e-06."
+    )
 
 
 # --- below the calibration -----------------------------------------------------------------------
 
 
-def calibrated(table: pd.DataFrame) -> str:
-    """Return in words how well the published pair is met, and how little it decides.
+def calibrated(screen: pd.DataFrame, final: pd.DataFrame) -> str:
+    """Return in words how well the published pair is met, and what was taken.
 
-    `table` is that of :func:`replication.evidence.calibration.calibration_table`.
+    Both tables are those of :func:`replication.evidence.calibration.calibration_table`.
     """
-    best = table.iloc[0]
-    n = int(best["n"])
-    low, high = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, n)
-    least, most = PAIR.sd * np.sqrt(stats.f.ppf([0.025, 0.975], n - 1, PAIR.n - 1))
-    inside = table["mean"].between(low, high) & table["sd"].between(least, most)
-    near = table[inside & (table["capped"] == 0)]
-    values = "; ".join(
-        f"{id}: {', '.join(map(str, sorted(near[id].unique())))}" for id in CALIBRATED
-    )
-    point = ", ".join(f"{id} = {best[id]}" for id in CALIBRATED)
-    return (
-        f"The nearest point is {'' if best['default'] else 'NOT '}our default: {point}, with a "
-        f"mean of {best['mean']:.2f} (SD {best['sd']:.2f}) in {n} trials; the paper has "
-        f"{PAIR.mean:.2f} ({PAIR.sd:.2f}). But {len(near)} of the {len(table)} points have a mean "
-        f"and an SD within the 95 % ranges of {n} trials from the published distribution "
-        f"({low:.1f} to {high:.1f}, and {least:.1f} to {most:.1f}). They have these values: "
-        f"{values}. So the pair narrows the choices down but does not determine them."
-    )
+    fitting = final[final["fits"]]
+    texts = [
+        f"Of {len(screen)} points {len(final)} went on to the second stage; {len(fitting)} of them "
+        "fit, that is, mean and SD both lie where those of as many trials from the published "
+        "distribution would."
+    ]
+    follows = "They are our defaults" if rule_follows(final) else "They are NOT our defaults"
+    for trace, point in nearest(final).items():
+        row = final[(final[[*WORLD, *TRACE, "F-INDEX"]] == point).all(axis=1)]
+        values = ", ".join(
+            f"{id} = {value}" for id, value in zip((*WORLD, *TRACE), point, strict=False)
+        )
+        text = f"Under {F_LABELS[trace]} the rule takes {values}"
+        for own in row.itertuples():
+            fits = "it fits" if own.fits else "it does not fit"
+            text += f", with a mean of {own.mean:.2f} (SD {own.sd:.2f}) in {own.n} trials: {fits}"
+        texts.append(f"{text}.")
+    return " ".join([*texts, f"{follows}."])
 
 
 def rechecked(check: pd.DataFrame) -> str:
-    """Return in words whether the chosen point stays as near in new trials.
+    """Return in words whether the chosen points stay as near in the trials of the judging run.
 
-    `check` is that of :func:`replication.evidence.calibration.check_table`: the grid's own trials,
-    new ones, and new ones under the other reading of Eq. 9.
+    `check` is that of :func:`replication.evidence.calibration.check_table`.
     """
-    old, new, other = check.itertuples()
-    mean = new.predicted_low <= new.mean <= new.predicted_high
-    sd = new.sd_predicted_low <= new.sd <= new.sd_predicted_high
-    predicted = "that the published distribution predicts"
-    inside = {
-        (True, True): f"both are inside the ranges {predicted}",
-        (True, False): f"the mean is inside the range {predicted}, the SD is not",
-        (False, True): f"the SD is inside the range {predicted}, the mean is not",
-        (False, False): f"neither is inside the range {predicted}",
-    }[mean, sd]
-    return (
-        f"In the {old.n} trials of the grid the chosen point has a mean of {old.mean:.2f} "
-        f"(SD {old.sd:.2f}); in {new.n} new ones, {new.mean:.2f} ({new.sd:.2f}): {inside}. The "
-        f"best of {len(grid())} noisy points, each known from {old.n} trials only, is partly "
-        f"lucky, so its fit regresses in new trials (winner's curse). Only {F_LABELS[new.reading]} "
-        f"was calibrated. {F_LABELS[other.reading]} inherits the point, and has {other.mean:.2f} "
-        f"({other.sd:.2f})."
-    )
+    texts = []
+    for row in check[check["trials"] == "judging"].itertuples():
+        mean = row.predicted_low <= row.mean <= row.predicted_high
+        sd = row.sd_predicted_low <= row.sd <= row.sd_predicted_high
+        words = {True: "is", False: "is not"}
+        where = f"the mean {words[mean]} where the published distribution predicts it, the SD "
+        texts.append(
+            f"Under {F_LABELS[row.reading]} the judging run has a mean of {row.mean:.2f} "
+            f"(SD {row.sd:.2f}) in {row.n} trials: {where}{words[sd]}."
+        )
+    return " ".join(texts)
 
 
 # --- below the specifications --------------------------------------------------------------------
@@ -250,10 +270,24 @@ def holding(effects: pd.DataFrame, id: str) -> str:
         on_map = effects["specification"].map(lambda name: named_choices(name).get("MAP") == place)
         rows = effects[effects["claim"].isin(same) & (effects["group"] == "factorial") & on_map]
     rows = rows[rows["outcome"] != UNDEFINED]
-    uncapped = rows[rows["capped"] == 0]
     if rows.empty:
         return "–"
-    without = f"; uncapped {_of(uncapped)}" if len(uncapped) < len(rows) else ""
+    if claim.task == "soccer" or not METHODS[claim.x].uses_incorrect:
+        return _counts(rows)
+    opposite = rows["specification"].map(lambda name: shows_opposite(named_choices(name)))
+    with_it, without = _counts(rows[opposite]), _counts(rows[~opposite])
+    return f"with moves in the opposite direction {with_it}; without {without}"
+
+
+def shows_opposite(choices: Mapping[str, str]) -> bool:
+    """Return whether a specification's incorrect demonstrations include the opposite direction."""
+    kinds = choices["INCORRECT-KINDS"].split("+")
+    return "opposite" in kinds or "all" in kinds
+
+
+def _counts(rows: pd.DataFrame) -> str:
+    uncapped = rows[rows["capped"] == 0]
+    without = f" (uncapped {_of(uncapped)})" if len(uncapped) < len(rows) else ""
     return f"{_of(rows)}{without}"
 
 

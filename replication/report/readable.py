@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from replication.evidence.claims import LABELS
+from replication.evidence.claims import LABELS, load_claims
 from replication.evidence.experiments import GENERAL, NAMED, NONE
 from replication.evidence.verdicts import NOT_TESTABLE, SHOWN
 from replication.irl import READINGS, get_method
@@ -90,6 +90,9 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
         f"{row.median:g} ({row.quartile_1:g}–{row.quartile_3:g})"
     )
     columns |= CAPPED
+    columns["First 100: mean (SD)"] = lambda row: (
+        f"{number(row.first_mean)} ({number(row.first_sd)})"
+    )
     if "paper_mean" in table:
         columns["Paper: mean (SD)"] = lambda row: (
             "–" if np.isnan(row.paper_mean) else f"{row.paper_mean:.2f} ({number(row.paper_sd)})"
@@ -132,17 +135,28 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
             {
                 "Set": lambda row: row.set,
                 f"{F_LABELS[reading]}: saves": lambda row: interval(row.saved, row.low, row.high),
+                f"{F_LABELS[reading]}: acts": lambda row: number(row.acted),
             },
         )
         shown = shown.join(cells.set_index("Set"))
     return shown.fillna("–").reset_index()
 
 
+def readable_kinds(table: pd.DataFrame) -> pd.DataFrame:
+    """Return how often wrong trajectories take a pair of each kind, a row for each kind."""
+    shown = table[["kind"]].drop_duplicates().rename(columns=str.capitalize).set_index("Kind")
+    for reading, rows in table.groupby("reading", sort=False):
+        column = f"{F_LABELS[str(reading)]}, of {rows['trajectories'].iloc[0]}"
+        shares = [f"{share:.1%}" for share in rows["share"]]
+        shown = shown.join(pd.Series(shares, index=rows["kind"], name=column))
+    return shown.reset_index()
+
+
 # --- judged claims ---------------------------------------------------------------------------
 
 
 def readable_verdicts(table: pd.DataFrame) -> pd.DataFrame:
-    """Return judged claims: one row a claim and set of demonstrations, the readings side by side."""
+    """Return judged claims: a row for each claim and set, the readings side by side."""
     rows = []
     for _, part in table.groupby("id", sort=False):
         for place, (set, cells) in enumerate(part.groupby("set", sort=False)):
@@ -178,6 +192,8 @@ def sentence(part: pd.DataFrame) -> str:
     """
     if part["verdict"].nunique() == 1:
         verdict = str(part["verdict"].iloc[0])
+        if part["statistic"].iloc[0] == "published-run":
+            return _probabilities(part)
         if verdict == NOT_TESTABLE:
             return f"{verdict}: {part['why'].iloc[0]}"
         return f"{verdict} in every cell" if len(part) > 1 else verdict
@@ -186,6 +202,10 @@ def sentence(part: pd.DataFrame) -> str:
     if len(texts) == 1:
         return texts[0]
     return "; ".join(f"{name}: {text}" for name, text in zip(names, texts, strict=True))
+
+
+def _probabilities(part: pd.DataFrame) -> str:
+    return "p = " + ", ".join(p_value(p) for p in part["p"])
 
 
 def _of_set(rows: pd.DataFrame) -> str:
@@ -197,6 +217,16 @@ def _of_set(rows: pd.DataFrame) -> str:
         labels = " and ".join(F_LABELS[reading] for reading in some["reading"])
         parts.append(f"{verdict} under {labels}")
     return ", ".join(parts)
+
+
+def readable_predictions(table: pd.DataFrame) -> pd.DataFrame:
+    """Return what was predicted for each claim, beside what came out."""
+    rows = []
+    for id, part in table.groupby("id", sort=False):
+        claim = load_claims().by_id(str(id))
+        if claim.prediction:
+            rows.append({"Claim": id, "Predicted": claim.prediction, "Came out": sentence(part)})
+    return pd.DataFrame(rows)
 
 
 def verdict_lines(table: pd.DataFrame) -> list[str]:

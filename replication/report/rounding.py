@@ -1,4 +1,4 @@
-"""Pictures of rounding: iterations by the tolerance of ties, and where along the path it decides."""
+"""Pictures of rounding: iterations by the tolerance of ties, and where it decides."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def draw_single(numbers: pd.DataFrame) -> Figure:
         first = part.iloc[0]
         part = part.set_index("specification").loc[names].assign(y=y)
         drawing.scale(panel, "x", first["statistic"], part["effect"])
-        panel.axvline(first["margin"], color="0.25", lw=1, zorder=1)
+        panel.axvline(first["neutral"], color="0.25", lw=1, zorder=1)
         panel.axvline(part.loc[DEFAULT, "effect"], color="0.1", lw=1, ls=(0, (4, 2)), zorder=1)
         for row in part[part["outcome"] != UNDEFINED].itertuples():
             colour = OUTCOMES[row.outcome]
@@ -74,7 +74,7 @@ def draw_single(numbers: pd.DataFrame) -> Figure:
         drawing.shade_blocks(panel, ids, y)
     drawing.label_blocks(axes[0], rows, y)
     capped = bool((numbers["capped"] > 0).any())
-    handles = drawing.outcome_handles("", "margin", capped=capped)
+    handles = drawing.outcome_handles("", "no effect", capped=capped)
     handles.append(handle("default", "", "0.1", lw=1, ls=(0, (4, 2))))
     legend_below(figure, handles)
     return figure

@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from replication.evidence.claims import short_label
@@ -93,17 +94,19 @@ def draw_curve(numbers: pd.DataFrame) -> Figure:
         panel.spines[:].set_visible(False)
         panel.tick_params(left=False, labelleft=False)
         panel.xaxis.label.set_size(7.5)
-    margin = f"margin ({drawing.number(first['margin'])})"
-    handles = drawing.outcome_handles("o", margin, capped=bool((part["capped"] > 0).any()))
+    neutral = f"no effect ({drawing.number(first['neutral'])})"
+    handles = drawing.outcome_handles("o", neutral, capped=bool((part["capped"] > 0).any()))
+    if part["null_low"].notna().any():
+        handles.append(Patch(color="0.85", lw=0, label="95 % without any effect"))
     handles.append(handle("holds, over all", "", OUTCOMES[HOLDS], lw=0.8, ls=":"))
     legend_below(figure, handles)
     return figure
 
 
 def _set_up(panel: Axes, first: pd.Series, part: pd.DataFrame) -> None:
-    """Set up the panel of the effects, with the claim's name and margin."""
+    """Set up the panel of the effects, with the claim's name and what no effect is."""
     drawing.scale(panel, "y", first["statistic"], part["effect"])
-    panel.axhline(first["margin"], color="0.25", lw=1, zorder=1)
+    panel.axhline(first["neutral"], color="0.25", lw=1, zorder=1)
     panel.set_xlim(-1.5, len(part) + 0.5)
     name, symmetric = drawing.unit(panel, "y", first["statistic"], first["measure"])
     panel.set_ylabel(f"{name}\n(95 % interval{symmetric})")
@@ -113,6 +116,8 @@ def _set_up(panel: Axes, first: pd.Series, part: pd.DataFrame) -> None:
 
 
 def _draw_effects(panel: Axes, part: pd.DataFrame) -> None:
+    band = part[["null_low", "null_high"]].to_numpy(float).T
+    panel.fill_between(part.index, *band, color="0.85", lw=0, zorder=0)
     style: dict[str, Any] = {"ms": 2.6, "mew": 0.7, "zorder": 4}
     for outcome, colour in OUTCOMES.items():
         rows = part[part["outcome"] == outcome]
@@ -135,9 +140,26 @@ def _write_counts(panel: Axes, part: pd.DataFrame) -> None:
     if below > above:
         (x, y), (ha, va) = (0.985, 0.04), ("right", "bottom")
     text = f"holds in {drawing.holding(part)}\n{drawing.counted(part)}{_without_caps(part)}"
+    text += _jointly(part)
     halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
     place: dict[str, Any] = {"transform": panel.transAxes, "ha": ha, "va": va}
     panel.text(x, y, text, size=8, linespacing=1.4, path_effects=halo, zorder=6, **place)
+
+
+def _jointly(part: pd.DataFrame) -> str:
+    """Say what the joint test of all specifications gives, if there is one."""
+    first = part.iloc[0]
+    if np.isnan(first["p_median"]):
+        return ""
+    alone = int((part["p_family"] < 0.05).sum())
+    return (
+        f"\njointly: median p {_equals(first['p_median'])}, number p {_equals(first['p_holds'])}"
+        f"\n{alone} beyond chance by themselves (family-wise)"
+    )
+
+
+def _equals(p: float) -> str:
+    return "< 0.001" if p < 0.001 else f"= {p:.3f}"
 
 
 def _finite(panel: Axes, values: NDArray[np.float64]) -> NDArray[np.float64]:

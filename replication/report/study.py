@@ -39,10 +39,13 @@ class Study(Outputs):
         Root seed, and number of worker processes.
     store, out
         The file of finished trials, and the folder for the results.
-    sets
-        Sets of incorrect demonstrations that are run beside those by which the paper is judged.
+    trials
+        Number of trials of each condition.
+    sets, set_trials
+        Sets of incorrect demonstrations that are run beside those by which the paper is judged, and
+        the number of their trials.
     report
-        Fields of :class:`replication.trials.measures.Report`, such as the number of trials.
+        Fields of :class:`replication.trials.measures.Report`.
     """
 
     def __init__(
@@ -55,7 +58,9 @@ class Study(Outputs):
         jobs: int,
         store: str,
         out: str,
+        trials: int,
         sets: Sequence[str] = (),
+        set_trials: int = 0,
         **report: Any,
     ) -> None:
         super().__init__(resolve(out))
@@ -63,6 +68,7 @@ class Study(Outputs):
         self.demos = load_demos(resolve(demos))
         self.choices = {**design.choices, **choices}
         self.report = Report(**report)
+        self.number, self.set_number = trials, set_trials
         self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
         given = self.demos, self.choices, design.methods
         self.conditions = experiments.conditions_of(*given, design.sets)
@@ -76,8 +82,8 @@ class Study(Outputs):
     def trials(self) -> pd.DataFrame:
         """The table of all trials, those of the sets included; it is written."""
         groups = [
-            Group(list(self.conditions.values()), self.report.trials),
-            Group(list(self.sets.values()), self.report.set_trials),
+            Group(list(self.conditions.values()), self.number),
+            Group(list(self.sets.values()), self.set_number),
         ]
         settings = {**self.settings}
         stage = settings.pop("seed"), lambda _: groups

@@ -10,15 +10,16 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from replication.evidence.claims import label
-from replication.evidence.sensitivity import HOLDS
-from replication.evidence.sensitivity import REVERSED as TURNED
-from replication.evidence.verdicts import REPRODUCED, REVERSED, by_claim, overall
+from replication.evidence.experiments import NONE
+from replication.evidence.verdicts import ABSENT, INCONCLUSIVE, REVERSED, SHOWN, by_claim
 from replication.report import drawing
-from replication.report.drawing import OUTCOMES, SMALL, UNITS, handle
+from replication.report.drawing import SMALL, UNITS, handle
 from replication.report.picture import Picture
+from replication.report.readable import F_LABELS, SET_LABELS, sentence
 from replication.report.style import canvas, legend_below, settled
 
-COLOURS = {REPRODUCED: OUTCOMES[HOLDS], REVERSED: OUTCOMES[TURNED]}
+COLOURS = {SHOWN: "#0072B2", ABSENT: "#D55E00", REVERSED: "#CC79A7", INCONCLUSIVE: "#8A8A8A"}
+"""A colour for each verdict that is drawn."""
 
 
 def verdicts(table: pd.DataFrame) -> Picture:
@@ -27,31 +28,31 @@ def verdicts(table: pd.DataFrame) -> Picture:
     `table` is that of :func:`~replication.evidence.verdicts.judge_claims`; claims about published
     numbers are not drawn.
     """
-    ids: dict[str, list[str]] = {}
-    for id, rows in by_claim(_comparative(table)):
-        ids.setdefault(overall(rows["verdict"].tolist()), []).append(id)
-    parts = [f"{len(some)} {verdict} ({', '.join(some)})" for verdict, some in ids.items()]
-    words = f"Of {sum(map(len, ids.values()))} comparative claims, {'; '.join(parts)}."
-    return Picture(table, draw_verdicts, words)
+    parts = [f"{label(id)}: {sentence(rows)}" for id, rows in by_claim(_comparative(table))]
+    return Picture(table, draw_verdicts, f"{'. '.join(parts)}.")
 
 
 @settled
 def draw_verdicts(numbers: pd.DataFrame) -> Figure:
-    """Draw the comparative claims of a table of verdicts."""
+    """Draw the comparative claims of a table of verdicts: a line for each claim and set."""
     table = _comparative(numbers)
     units = [unit for unit in dict.fromkeys(UNITS.values()) if unit in set(table["unit"])]
     parts = [table[table["unit"] == unit] for unit in units]
-    sizes = [part["id"].nunique() for part in parts]
-    height = 0.4 + 0.37 * len(units) + 0.29 * sum(sizes)
+    sizes = [len(part[["id", "set"]].drop_duplicates()) for part in parts]
+    height = 0.4 + 0.4 * len(units) + 0.3 * sum(sizes)
     figure, axes = canvas(len(units), 1, height=height, height_ratios=sizes)
     for panel, unit, part in zip(axes, units, parts, strict=True):
         _draw_unit(panel, part)
         panel.set_xlabel(unit, size=7.5, labelpad=1)
-    handles = drawing.reading_handles(table)
+    used = [name for name in COLOURS if name in set(table["verdict"])]
+    handles = [handle(name, "", COLOURS[name], lw=2.2) for name in used]
+    readings = [name for name in drawing.READING_MARKS if name in set(table["reading"]) - {""}]
+    handles += [
+        handle(F_LABELS[name], drawing.READING_MARKS[name][0], "0.3", lw=0) for name in readings
+    ]
     handles += [
         handle("the paper's effect", "v", "0.3", ms=6, mfc="white", lw=0),
-        handle("margin", "", "0.25", lw=1),
-        Patch(color="0.93", lw=0, label="claimed side"),
+        Patch(color="0.9", lw=0, label="within the margin"),
     ]
     legend_below(figure, handles)
     return figure
@@ -63,25 +64,32 @@ def _comparative(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_unit(panel: Axes, part: pd.DataFrame) -> None:
-    ids = list(dict.fromkeys(part["id"]))
+    rows = [(id, set) for id, cells in by_claim(part) for set in cells["set"].unique()]
+    ratio, share = (part["statistic"].iloc[0] == name for name in ("sd-ratio", "share"))
     drawing.scale(panel, "x", part["statistic"].iloc[0], part["effect"])
     _limit(panel, part[["low", "high", "effect", "paper", "margin"]].to_numpy(float))
-    for at, (_, rows) in enumerate(by_claim(part)):
-        claimed, margin = rows["direction"].iloc[0], rows["margin"].iloc[0]
-        side = panel.get_xlim()[int(claimed == "greater")]
-        panel.fill_betweenx([at - 0.48, at + 0.48], margin, side, color="0.93", lw=0, zorder=0)
-        panel.vlines(margin, at - 0.48, at + 0.48, color="0.25", lw=1, zorder=1)
-        for place, row in zip(np.linspace(-0.25, 0.25, len(rows)), rows.itertuples(), strict=True):
-            mark, colour = drawing.READING_MARKS[row.reading]
-            panel.hlines(at + place, row.low, row.high, color=colour, lw=1.4)
-            panel.plot(row.effect, at + place, mark, color=colour, ms=4, zorder=4)
-            weight = "bold" if row.verdict in COLOURS else "normal"
-            ink = COLOURS.get(row.verdict, "0.35")
-            drawing.beside(panel, row.verdict, 1, at + place, 5, color=ink, weight=weight)
-        panel.plot(rows["paper"].iloc[0], at, "v", ms=6, mfc="none", mec="0.3", zorder=5)
-    panel.set(yticks=range(len(ids)), ylim=(len(ids) - 0.5, -0.5))
-    panel.set_yticklabels([f"{label(id)}\n{id}" for id in ids], size=SMALL)
-    panel.tick_params(axis="x", labelsize=SMALL, pad=2)
+    if not share:
+        panel.axvline(float(ratio), color="0.25", lw=1, zorder=1)
+    for at, (id, set) in enumerate(rows):
+        cells = part[(part["id"] == id) & (part["set"] == set)]
+        margin = cells["margin"].max()
+        if not np.isnan(margin):
+            ends = (margin, 1 / margin) if ratio else (-margin, margin)
+            ends = (panel.get_xlim()[0], margin) if share else ends
+            panel.fill_betweenx([at - 0.48, at + 0.48], *ends, color="0.9", lw=0, zorder=0)
+        for place, row in zip(
+            np.linspace(-0.28, 0.28, len(cells)), cells.itertuples(), strict=True
+        ):
+            mark, _ = drawing.READING_MARKS[row.reading]
+            colour = COLOURS.get(row.verdict, "0.5")
+            panel.hlines(at + place, row.low, row.high, color=colour, lw=1.6)
+            panel.plot(row.effect, at + place, mark, ms=4, color=colour, zorder=3)
+        paper = cells["paper"].iloc[0]
+        if not np.isnan(paper):
+            panel.plot(paper, at, "v", ms=6, mfc="white", mec="0.3", zorder=4)
+    panel.set_ylim(len(rows) - 0.5, -0.5)
+    names = [label(id) if set == NONE else f"{label(id)}: {SET_LABELS[set]}" for id, set in rows]
+    panel.set_yticks(range(len(rows)), names, size=SMALL)
     panel.tick_params(axis="y", length=0)
     panel.spines["left"].set_visible(False)
 

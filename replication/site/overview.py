@@ -14,16 +14,14 @@ import pandas as pd
 import yaml
 
 from replication.evidence.claims import evidence
+from replication.evidence.experiments import NAMED
 from replication.irl import READINGS
 from replication.paper.register import Choice, load_choices
-from replication.report.readable import markdown, readable_verdicts
+from replication.report.readable import SET_LABELS, markdown, readable_verdicts, sentence
 from replication.site.pages import anchor
 
-WIDTH, HEIGHT, MARGIN = 190, 40, 6
-"""Of an interval plot, in pixels."""
-
-HEIGHTS = {"printed": 13, "updated": 27}
-"""At which height each reading of Eq. 9 is drawn."""
+WIDTH, MARGIN, LINE = 190, 6, 10
+"""Of an interval plot, in pixels; a cell takes one line."""
 
 
 def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
@@ -36,23 +34,21 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
     holds
         By claim, in how many of the other specifications it holds.
     """
-    compared = judged[judged["direction"] != "inside"]
-    readable = readable_verdicts(compared).to_dict("records")
     rows = []
-    for (id, part), row in zip(compared.groupby("id", sort=False), readable, strict=True):
-        notebook, name = evidence(part["task"].iloc[0], part["measure"].iloc[0]).split("/")
+    for id, part in _comparative(judged).groupby("id", sort=False):
+        first = part.iloc[0]
+        notebook, name = evidence(first["task"], first["measure"]).split("/")
         shown = (
             f"#{anchor(notebook, name)}" if name != "trials" else f"figures/{notebook}/trials.csv"
         )
+        paper = "–" if math.isnan(first["paper"]) else f"{first['paper']:.2f}"
         rows.append(
             {
-                "Claim": row["Claim"],
-                "Verdict": f"[{row['Verdict']}]({shown})",
+                "Claim": first["claim"],
+                "Verdict": f"[{sentence(part)}]({shown})",
+                "Paper": f"{paper} ({first['place']})".removeprefix("– "),
+                "Effects, with 95 % intervals": interval_plot(part),
                 "Holds with other choices": holds[str(id)],
-                "Paper": f"{row['Paper']} ({row['Place']})".removeprefix("– "),
-                "Effect, with 95 % interval": interval_plot(part),
-                "Fᵢ (printed)": row["Fᵢ (printed)"],
-                "Fᵢ₊₁ (updated)": row["Fᵢ₊₁ (updated)"],
             }
         )
     return markdown(pd.DataFrame(rows))
@@ -60,7 +56,11 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
 
 def published(judged: pd.DataFrame) -> str:
     """Return the verdicts on the published numbers themselves."""
-    return markdown(readable_verdicts(judged[judged["direction"] == "inside"]))
+    return markdown(readable_verdicts(judged[judged["statistic"].str.startswith("published")]))
+
+
+def _comparative(judged: pd.DataFrame) -> pd.DataFrame:
+    return judged[~judged["statistic"].str.startswith("published")]
 
 
 # --- a small picture of a claim --------------------------------------------------------------
@@ -69,38 +69,55 @@ def published(judged: pd.DataFrame) -> str:
 def interval_plot(part: pd.DataFrame) -> str:
     """Return the effects of a claim as a small picture, one line of SVG in the page's own colours.
 
-    The grey side is the claimed one; a circle is the printed reading of Eq. 9, a square the updated
-    one, and a triangle the paper's effect.
+    A line for each cell: a circle is F_i, a square F_(i+1), a diamond the maximum at once; hollow
+    marks are those of the named kinds. Grey lies within the margin; a triangle is the paper's
+    effect.
     """
     first = part.iloc[0]
-    margin, paper = float(first["margin"]), float(first["paper"])
-    values = [margin, paper, *part[["effect", "low", "high"]].to_numpy(float).ravel()]
+    paper, margin = float(first["paper"]), float(part["margin"].max())
+    ratio, share = (first["statistic"] == name for name in ("sd-ratio", "share"))
+    neutral = margin if share else float(ratio)
+    ends = (1.0, margin) if share else (margin, 1 / margin) if ratio else (-margin, margin)
+    values = [neutral, paper, *ends, *part[["effect", "low", "high"]].to_numpy(float).ravel()]
     known = [value for value in values if not math.isnan(value)]
     left, width = min(known), (max(known) - min(known)) or 1.0
+    height = LINE * (len(part) + 2)
 
     def x(value: float) -> float:
         return round(MARGIN + (value - left) / width * (WIDTH - 2 * MARGIN), 1)
 
-    edge = x(margin)
-    begin, end = (0.0, edge) if first["direction"] == "less" else (edge, float(WIDTH))
-    marks = [
-        _mark("rect", "claimed", x=begin, y=0, width=round(end - begin, 1), height=HEIGHT),
-        _mark("line", "edge", x1=edge, x2=edge, y1=0, y2=HEIGHT),
-    ]
-    for row in part.dropna(subset="effect").itertuples():
-        reading = _reading(row.reading)
-        y, at = HEIGHTS[reading], x(row.effect)
+    marks = []
+    if not math.isnan(margin) and not share:
+        begin, end = map(x, ends)
+        marks.append(
+            _mark("rect", "margin", x=begin, y=0, width=round(end - begin, 1), height=height)
+        )
+    marks.append(_mark("line", "edge", x1=x(neutral), x2=x(neutral), y1=0, y2=height))
+    for line, row in enumerate(part.itertuples()):
+        if math.isnan(row.effect):
+            continue
+        reading, y, at = row.reading or READINGS[0], LINE * (line + 1), x(row.effect)
+        kind = f"{reading} hollow" if row.set == NAMED else reading
         marks.append(_mark("line", reading, x1=x(row.low), x2=x(row.high), y1=y, y2=y))
         if reading == READINGS[0]:
-            marks.append(_mark("circle", reading, cx=at, cy=y, r=4))
+            marks.append(_mark("circle", kind, cx=at, cy=y, r=3.5))
+        elif reading == READINGS[1]:
+            marks.append(_mark("rect", kind, x=round(at - 3, 1), y=y - 3, width=6, height=6))
         else:
-            marks.append(_mark("rect", reading, x=round(at - 3.5, 1), y=y - 3.5, width=7, height=7))
+            corners = f"{at - 4:.1f},{y} {at},{y - 4} {at + 4:.1f},{y} {at},{y + 4}"
+            marks.append(_mark("polygon", kind, points=corners))
     if not math.isnan(paper):
-        at = x(paper)
-        marks.append(_mark("polygon", "paper", points=f"{at - 5:.1f},15 {at + 5:.1f},15 {at},24"))
+        at, y = x(paper), height
+        marks.append(
+            _mark(
+                "polygon",
+                "paper",
+                points=f"{at - 5:.1f},{y - 10} {at + 5:.1f},{y - 10} {at},{y - 1}",
+            )
+        )
     return (
         f'<svg class="interval" role="img" aria-label="{html.escape(_in_words(part))}" '
-        f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">{"".join(marks)}</svg>'
+        f'viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}">{"".join(marks)}</svg>'
     )
 
 
@@ -109,19 +126,15 @@ def _mark(shape: str, kind: str, **places: object) -> str:
     return f'<{shape} class="{kind}" {numbers}></{shape}>'
 
 
-def _reading(reading: str) -> str:
-    """Return a reading of Eq. 9; a claim about a method without a trace has but one line."""
-    return reading or READINGS[0]
-
-
 def _in_words(part: pd.DataFrame) -> str:
     first = part.iloc[0]
     effects = "; ".join(
-        f"{_reading(row.reading)} F: {row.effect:.3g} from {row.low:.3g} to {row.high:.3g}"
+        f"{row.reading or READINGS[0]} F, {SET_LABELS[row.set]}: {row.effect:.3g} from "
+        f"{row.low:.3g} to {row.high:.3g}"
         for row in part.itertuples()
     )
     paper = "" if math.isnan(first["paper"]) else f" Paper: {first['paper']:.3g}."
-    return f"{effects}. Margin: {first['margin']:.3g}.{paper}"
+    return f"{effects}. Margin: {part['margin'].max():.3g}.{paper}"
 
 
 # --- choices and citation --------------------------------------------------------------------

@@ -25,8 +25,6 @@ from replication.trials.results import Results, digest
 class Report(Chosen):
     """What the tables and figures show of the trials."""
 
-    trials: int = choice("TABLE2-TRIALS")
-    set_trials: int = choice("SET-TRIALS")
     early: float = choice("EARLY")
     surface: str = choice("FIG7-SURFACE")
     mid_term: float = choice("FIG7-MIDTERM")
