@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from replication.demos.files import load_demos
@@ -157,4 +158,5 @@ def main_trials(trials: pd.DataFrame) -> pd.DataFrame:
 def under(rows: pd.DataFrame, reading: str) -> pd.DataFrame:
     """Return the rows that count under a reading of Eq. 9, see :meth:`Method.under`."""
     pairs = zip(rows["method"], rows["reading"], strict=True)
-    return rows[[get_method(method).under(reading) == own for method, own in pairs]]
+    counts = [get_method(method).under(reading) == own for method, own in pairs]
+    return rows[np.array(counts, dtype=bool)]

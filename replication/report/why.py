@@ -68,7 +68,8 @@ ALONE = ("hit", "detour", "opposite", NAMED, GENERAL)
 def draw_why(numbers: pd.DataFrame) -> Figure:
     """Draw the three panels."""
     figure, (where, taken, saves) = canvas(1, 3, height=3.0, width_ratios=(1.1, 1, 1))
-    draw_map(where, numbers[numbers["part"] == "map"], grid=False)
+    cells = numbers[numbers["part"] == "map"].astype({"x": int, "y": int})
+    draw_map(where, cells, grid=False)
     path = numbers[numbers["part"] == "path"]
     where.plot(path["x"], path["y"], color="0.55", lw=4, alpha=0.5, solid_capstyle="round")
     way = numbers[numbers["part"] == "trajectory"]
