@@ -42,15 +42,16 @@ def draw_points(numbers: pd.DataFrame) -> Figure:
             if row.default:
                 panel.plot(row.mean, row.sd, "o", ms=11, mfc="none", mec="0.1", mew=1.2)
         mean, sd = numbers[["paper_mean", "paper_sd"]].iloc[0]
-        panel.plot(mean, sd, "*", ms=14, mfc="white", mec="#D0021B", mew=1.3, zorder=5)
+        panel.plot(mean, sd, "*", ms=14, mfc="none", mec="#D0021B", mew=1.3, zorder=5)
         panel.set(title=F_LABELS[trace], xlabel="mean of the iterations")
     axes[0].set_ylabel("SD of the iterations")
     handles = [
-        handle("fits", "o", "#0072B2", lw=0),
-        handle("does not fit", "o", "0.55", mfc="white", lw=0),
-        handle("default", "o", "0.1", ms=9, mfc="none", lw=0),
-        handle(f"published ({mean:.2f}, {sd:.2f})", "*", "#D0021B", ms=10, mfc="white", lw=0),
+        handle("fits, with 95 % intervals", "o", "#0072B2", lw=0.9),
+        handle("does not fit", "o", "0.55", mfc="white", lw=0.9),
+        handle(f"published ({mean:.2f}, {sd:.2f})", "*", "#D0021B", ms=10, mfc="none", lw=0),
     ]
+    if numbers["default"].any():
+        handles.insert(2, handle("default", "o", "0.1", ms=9, mfc="none", lw=0))
     legend_below(figure, handles)
     return figure
 
