@@ -169,10 +169,8 @@ def test_the_legend_names_what_is_drawn(trials: pd.DataFrame) -> None:
         "Unified, with incorrect (named kinds)",
         "Unified, with incorrect (general list)",
     ]
-    for figure in (
-        draw_errors(errors(trials, {}).numbers),
-        draw_iterations(iterations(trials, {}).numbers),
-    ):
+    pictures = errors(trials, {}), iterations(trials, {})
+    for figure in (picture.draw(picture.numbers) for picture in pictures):
         (legend,) = figure.legends
         texts = [text.get_text() for text in legend.get_texts()]
         assert texts[: len(labels)] == labels
@@ -236,7 +234,7 @@ def test_the_papers_mean_is_not_cut_off() -> None:
 
 
 def test_savings_are_to_scale() -> None:
-    """A dot stands at what a set saves, positive to the right, on its interval, for each reading."""
+    """A dot stands at what a set saves, on its interval, in the panel of each reading."""
     figure = draw_sets(SAVED)
     for panel, (_, own) in zip(figure.axes, SAVED.groupby("reading", sort=False), strict=True):
         (dots,) = (line for line in panel.lines if line.get_marker() == "o")
