@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,6 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from replication.evidence.calibration import TRACE, WORLD, points
 from replication.evidence.claims import LABELS, load_claims
@@ -35,6 +34,7 @@ from replication.report.drawing import OUTCOMES, UNITS
 from replication.report.picture import Picture
 from replication.report.readable import sentence
 from replication.report.style import save_figure
+from tests.report.legible import assert_legible
 
 MAZES = load_specifications().mazes
 FACTORIAL = factorial_specifications(MAZES.factorial)
@@ -54,7 +54,7 @@ def some_effects() -> pd.DataFrame:
         n = len(specifications)
         ratio = claim.statistic == "sd-ratio"
         effect = np.exp(rng.normal(size=n)) if ratio else rng.normal(size=n) * 20
-        joint = dict.fromkeys(JOINT, np.nan)
+        joint: dict[str, Any] = dict.fromkeys(JOINT, np.nan)
         if claim.statistic == "saved":
             joint |= {"p_family": rng.uniform(size=n), "p_median": 0.0004, "p_holds": 0.0321}
             joint |= {"null_low": np.sort(effect) - 5, "null_high": np.sort(effect) + 5}
@@ -92,8 +92,13 @@ def some_verdicts() -> pd.DataFrame:
             effect = min(effect, 1.0) if claim.statistic == "share" else effect
             margin = claim.margin or (0.8 if claim.statistic == "sd-ratio" else 2.0)
             margin = np.nan if claim.statistic == "mean" or np.isnan(effect) else margin
-            row = {"id": claim.id, "measure": claim.measure, "statistic": claim.statistic}
-            row |= {"reading": reading, "set": set, "paper": claim.paper_effect, "why": "some"}
+            row: dict[str, Any] = {
+                "id": claim.id,
+                "measure": claim.measure,
+                "statistic": claim.statistic,
+            }
+            row |= {"reading": reading, "set": set}
+            row |= {"paper": claim.paper_effect, "why": "some"}
             row |= {"effect": effect, "low": effect - 0.4, "high": effect + 1}
             rows.append(row | {"margin": margin, "verdict": verdict})
     return pd.DataFrame(rows)
@@ -158,34 +163,10 @@ def drawings() -> dict[str, Figure]:
     return {name: drawn(picture) for name, picture in PICTURES.items()}
 
 
-def shown_texts(figure: Figure) -> list[Text]:
-    """Return all texts that are drawn: not the labels of ticks beyond the ends of an axis."""
-    texts = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
-    for panel in figure.axes:
-        texts += panel.texts
-        texts += [panel.title, panel._left_title]  # type: ignore[attr-defined]
-        for axis in (panel.xaxis, panel.yaxis) if panel.axison else ():
-            low, high = sorted(axis.get_view_interval())
-            texts.append(axis.label)
-            for tick in axis.get_major_ticks():
-                if low <= tick.get_loc() <= high:
-                    texts += [tick.label1, tick.label2]
-    return [text for text in texts if text.get_visible() and text.get_text()]
-
-
 @pytest.mark.parametrize("kind", PICTURES)
 def test_texts_are_legible(kind: str, drawings: dict[str, Figure]) -> None:
-    """No text is smaller than 7 points, lies outside the figure or overlaps another."""
-    figure = drawings[kind]
-    boxes = {text: text.get_window_extent() for text in shown_texts(figure)}
-    width, height = figure.bbox.size
-    for text, box in boxes.items():
-        assert float(text.get_fontsize()) >= 7, text
-        assert min(box.x0, box.y0) > -0.5, text
-        assert box.x1 < width + 0.5, text
-        assert box.y1 < height + 0.5, text
-    for one, other in combinations(boxes, 2):
-        assert not boxes[one].padded(-0.5).overlaps(boxes[other].padded(-0.5)), (one, other)
+    """No text is too small, lies outside the figure or overlaps another."""
+    assert_legible(drawings[kind])
 
 
 @pytest.mark.parametrize("kind", PICTURES)
@@ -403,12 +384,16 @@ def test_finalists_stand_at_their_numbers() -> None:
     ):
         dots = [line for line in panel.lines if line.get_marker() == "o"]
         places = {
-            size: [np.asarray(dot.get_xydata())[0].tolist() for dot in dots if dot.get_ms() == size]
+            size: [
+                np.asarray(dot.get_xydata())[0].tolist()
+                for dot in dots
+                if dot.get_markersize() == size
+            ]
             for size in (5, 11)
         }
         assert places[5] == own[["mean", "sd"]].to_numpy().tolist()
         assert places[11] == own.loc[own["default"], ["mean", "sd"]].to_numpy().tolist()
-        filled = [dot.get_markerfacecolor() != "w" for dot in dots if dot.get_ms() == 5]
+        filled = [dot.get_markerfacecolor() != "w" for dot in dots if dot.get_markersize() == 5]
         assert filled == own["fits"].tolist()
         (star,) = (line for line in panel.lines if line.get_marker() == "*")
         assert np.asarray(star.get_xydata()).tolist() == [[40.10, 4.73]]

@@ -23,6 +23,7 @@ from replication.report.curves import (
 from replication.trials.condition import Condition
 from replication.trials.measures import error_histories
 from replication.trials.results import Results
+from tests.report.legible import assert_legible
 
 Conditions = dict[Key, Condition]
 
@@ -176,6 +177,12 @@ def test_the_legend_names_what_is_drawn(trials: pd.DataFrame) -> None:
         assert texts[: len(labels)] == labels
         looks = [(line.get_color(), line.is_dashed()) for line in legend.get_lines()]
         assert set(lines_of(figure.axes[0])) <= set(looks)
+
+
+def test_texts_are_legible(trials: pd.DataFrame) -> None:
+    """With all methods, readings and sets, nothing is too small, cut off or written over."""
+    for picture in (errors(trials, {}), iterations(trials, {}), sets(SAVED)):
+        assert_legible(picture.draw(picture.numbers))
 
 
 def test_dots_that_end_together_are_all_seen() -> None:

@@ -6,7 +6,7 @@ import pytest
 from replication import Demos
 from replication.envs.maze import MazeError, as_maze
 from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import Key
+from replication.evidence.experiments import NONE, Key
 from replication.irl import Trial
 from replication.report.maze import demonstrations, draw_surfaces, map_numbers, surfaces
 from replication.trials.condition import Condition
@@ -17,7 +17,7 @@ from replication.trials.results import Results
 @pytest.fixture
 def trial(conditions: dict[Key, Condition], results: Results) -> Trial:
     """Return a trial of the unified method that kept every iteration."""
-    return results.trial(conditions["unified", "printed"], 0, snapshots=True)
+    return results.trial(conditions["unified", "printed", NONE], 0, snapshots=True)
 
 
 def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, trial: Trial) -> None:

@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from replication import Demos
+from replication.envs.maze import as_maze
+from replication.evidence.experiments import NONE, Key
+from replication.irl import Trial
+from replication.report.drawing import READING_MARKS
+from replication.report.maze import places
+from replication.report.picture import Picture
+from replication.report.why import ALONE, why
+from replication.trials.condition import Condition
+from replication.trials.results import Results
+from tests.report.legible import assert_legible
+
+KINDS = pd.DataFrame(
+    [
+        (reading, kind, share)
+        for reading, shares in (("printed", (0.0, 0.22, 0.51)), ("updated", (0.01, 0.25, 0.53)))
+        for kind, share in zip(("hit", "detour", "opposite"), shares, strict=True)
+    ],
+    columns=["reading", "kind", "share"],
+)
+SAVED = pd.DataFrame(
+    [
+        (set, reading, saved, saved - 1, saved + 2)
+        for set, first in zip(("near-detour", *ALONE), (9, 0, 1, 4, 2, 6), strict=True)
+        for reading, saved in (("printed", first), ("updated", first + 0.5), ("at-once", -first))
+    ],
+    columns=["set", "reading", "saved", "low", "high"],
+)
+
+
+@pytest.fixture(scope="module")
+def trial(conditions: dict[Key, Condition], results: Results) -> Trial:
+    """Return the trial whose trajectory is drawn."""
+    return results.trial(conditions["unified", "printed", NONE], 0, snapshots=True)
+
+
+@pytest.fixture(scope="module")
+def picture(trial: Trial, small_demos: Demos) -> Picture:
+    """Make the picture."""
+    return why(KINDS, SAVED, {("unified", "printed", NONE): trial}, small_demos)
+
+
+@pytest.fixture(scope="module")
+def figure(picture: Picture) -> Figure:
+    """Draw it."""
+    return picture.draw(picture.numbers)
+
+
+def test_the_way_is_that_after_the_first_update(
+    figure: Figure, trial: Trial, small_demos: Demos
+) -> None:
+    """On the map are the expert's path, all of the agent's trajectory, and a dot at its end."""
+    path, way, end = (np.asarray(line.get_xydata()) for line in figure.axes[0].lines[-3:])
+    maze = as_maze(small_demos.environment)
+    np.testing.assert_allclose(path.T, places(maze, small_demos.correct[0].states))
+    np.testing.assert_allclose(way.T, places(maze, trial.episodes[1].states))
+    np.testing.assert_array_equal(end, way[-1:])
+
+
+def test_bars_are_the_shares(figure: Figure) -> None:
+    """Each kind has a bar for each reading, in per cent and with its number; none is cut off."""
+    panel = figure.axes[1]
+    bars = panel.containers
+    for container, (reading, own) in zip(bars, KINDS.groupby("reading", sort=False), strict=True):
+        assert [bar.get_width() for bar in container] == pytest.approx(100 * own["share"])
+        heights = [bar.get_y() + bar.get_height() / 2 for bar in container]
+        assert np.round(heights).tolist() == [0, 1, 2]
+        colours = {bar.get_facecolor()[:3] for bar in container}
+        (colour,) = {tuple(np.round(c, 6)) for c in colours}
+        expected = READING_MARKS[str(reading)][1]
+        assert "#" + "".join(f"{round(255 * x):02X}" for x in colour) == expected
+    assert [text.get_text() for text in panel.texts] == ["0", "22", "51", "1", "25", "53"]
+    names = [label.get_text() for label in panel.get_yticklabels()]
+    assert names == ["hit", "detour", "opposite"]
+    assert panel.yaxis_inverted()
+    assert panel.get_xlim()[1] > 53
+
+
+def test_savings_stand_at_their_values(figure: Figure) -> None:
+    """Each set that stands for itself or is judged has its saving and interval by reading."""
+    panel = figure.axes[2]
+    dots = [line for line in panel.lines if line.get_marker() in ("o", "s", "D")]
+    spans = [one for one in panel.collections if isinstance(one, LineCollection)]
+    shown = SAVED[SAVED["set"] != "near-detour"]
+    for dot, span, (reading, own) in zip(
+        dots, spans, shown.groupby("reading", sort=False), strict=True
+    ):
+        assert (dot.get_marker(), dot.get_color()) == READING_MARKS[str(reading)]
+        assert np.asarray(dot.get_xdata()).tolist() == own["saved"].tolist()
+        assert np.round(np.asarray(dot.get_ydata())).tolist() == [0, 1, 2, 3, 4]
+        ends = [np.asarray(segment)[:, 0].tolist() for segment in span.get_segments()]
+        assert ends == own[["low", "high"]].to_numpy().tolist()
+    labels = [label.get_text() for label in panel.get_yticklabels()]
+    assert labels == ["hit", "detour", "opposite", "named kinds", "general list"]
+    assert panel.yaxis_inverted()
+
+
+def test_texts_are_legible(figure: Figure) -> None:
+    """Numbers beside bars, labels and the legend have room."""
+    assert_legible(figure)
+
+
+def test_the_legend_names_both_ways_and_all_readings(figure: Figure) -> None:
+    """Who sees the map or a mark finds in the legend what it is."""
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "the expert's path",
+        "the agent's after the first update",
+        "Fᵢ (printed)",
+        "Fᵢ₊₁ (updated)",
+        "Fᵢ, maximum at once",
+    ]
+    drawn = {line.get_color() for panel in figure.axes for line in panel.lines}
+    assert {line.get_color() for line in legend.get_lines()} <= drawn
+
+
+def test_words_have_the_shares(picture: Picture, trial: Trial) -> None:
+    """Who does not see the picture reads how long the loop is, and the share of each kind."""
+    episode = trial.episodes[1]
+    cells = len(np.unique(episode.states))
+    assert f"walks {cells} cells of the map in {len(episode.actions)} moves" in picture.words
+    assert "opposite, Fᵢ (printed): 51%" in picture.words
+    assert "hit, Fᵢ₊₁ (updated): 1%" in picture.words
