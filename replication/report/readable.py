@@ -68,6 +68,11 @@ def p_value(p: float) -> str:
     return "–" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
+def p_is(p: float) -> str:
+    """Return what a p-value is, as a part of a sentence."""
+    return f"p {p_value(p)}" if p < 0.001 else f"p = {p_value(p)}"
+
+
 METHOD: dict[str, Form] = {
     "Method": lambda row: get_method(row.method).label,
     "Reading": lambda row: F_LABELS[row.reading],
@@ -173,7 +178,7 @@ def cell(row: Any) -> str:
     if row.verdict == NOT_TESTABLE and np.isnan(row.effect):
         return f"{NOT_TESTABLE}: {row.why}"
     if row.statistic == "published-run":
-        return f"median {row.effect:g}; p = {p_value(row.p)}"
+        return f"median {row.effect:g}; {p_is(row.p)}"
     text = interval(row.effect, row.low, row.high)
     text = f"× {text}" if row.statistic == "sd-ratio" else text
     verdict = f"**{row.verdict}**" if row.verdict == SHOWN else row.verdict
@@ -205,7 +210,7 @@ def sentence(part: pd.DataFrame) -> str:
 
 
 def _probabilities(part: pd.DataFrame) -> str:
-    return "p = " + ", ".join(p_value(p) for p in part["p"])
+    return ", ".join(p_is(p) for p in part["p"])
 
 
 def _of_set(rows: pd.DataFrame) -> str:

@@ -18,6 +18,7 @@ from replication.evidence.specifications import DEFAULT, default_of, named_choic
 from replication.report import drawing
 from replication.report.drawing import OUTCOMES, SMALL, handle
 from replication.report.picture import Picture
+from replication.report.readable import p_is
 from replication.report.style import canvas, legend_below, settled
 
 
@@ -153,13 +154,9 @@ def _jointly(part: pd.DataFrame) -> str:
         return ""
     alone = int((part["p_family"] < 0.05).sum())
     return (
-        f"\njointly: median p {_equals(first['p_median'])}, number p {_equals(first['p_holds'])}"
+        f"\njointly: median {p_is(first['p_median'])}, number {p_is(first['p_holds'])}"
         f"\n{alone} beyond chance by themselves (family-wise)"
     )
-
-
-def _equals(p: float) -> str:
-    return "< 0.001" if p < 0.001 else f"= {p:.3f}"
 
 
 def _finite(panel: Axes, values: NDArray[np.float64]) -> NDArray[np.float64]:

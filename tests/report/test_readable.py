@@ -1,23 +1,39 @@
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 
+from replication.evidence.claims import load_claims
+from replication.evidence.experiments import EXPERIMENTS, GENERAL, NAMED, NONE
 from replication.evidence.tables import read_table, write_csv
-from replication.evidence.verdicts import overall
-from replication.files import PROJECT
+from replication.evidence.verdicts import (
+    ABSENT,
+    CONSISTENT,
+    INCONCLUSIVE,
+    INCONSISTENT,
+    NOT_TESTABLE,
+    REVERSED,
+    SHOWN,
+)
+from replication.irl import READINGS
 from replication.report.readable import (
+    F_LABELS,
+    SET_LABELS,
+    full_label,
     markdown,
     readable_ablations,
     readable_contrasts,
+    readable_kinds,
     readable_levels,
     readable_outcomes,
+    readable_predictions,
     readable_sets,
     readable_summary,
     readable_verdicts,
+    sentence,
     verdict_lines,
 )
 
@@ -44,117 +60,190 @@ def test_markdown_is_a_table() -> None:
 # --- tables of the experiments ---------------------------------------------------------------
 
 
+def test_full_labels() -> None:
+    """A label has the set and the reading, where there is one."""
+    assert full_label("adaboost", "") == "AdaBoost-IRL (R1)"
+    assert full_label("unified", "printed") == "Unified, without incorrect, Fᵢ (printed)"
+    given = "Unified, with incorrect"
+    assert full_label("unified-incorrect", "updated", GENERAL) == (
+        f"{given} (general list), Fᵢ₊₁ (updated)"
+    )
+    assert full_label("unified-incorrect", "at-once", "opposite") == (
+        f"{given} (opposite), Fᵢ, maximum at once"
+    )
+
+
+def test_all_readings_and_judged_sets_have_a_label() -> None:
+    """What stands in tables and figures is a word for each, and none twice."""
+    assert [*F_LABELS] == ["", *READINGS]
+    assert {set for each in EXPERIMENTS.values() for set in (NONE, *each.sets)} == {*SET_LABELS}
+    for labels in (F_LABELS, SET_LABELS):
+        assert len({*labels.values()}) == len(labels)
+
+
 def test_readable_summary_by_hand() -> None:
     """Means have their intervals, and what the paper does not give is a dash."""
     summary = table(
-        "method reading n capped mean low high sd median quartile_1 quartile_3 paper_mean paper_sd",
-        ("adaboost", "", 30, 0, 44.0, 43.0, 45.5, 6.789, 44.0, 40.0, 47.0, 44.94, 10.27),
-        ("unified", "updated", 30, 2, NAN, NAN, NAN, NAN, 41.5, 38.25, 45.0, NAN, NAN),
-    ).assign(predicted_low=[42.06, NAN], predicted_high=[47.82, NAN])
-    assert shown(readable_summary(summary)) == [
-        "AdaBoost-IRL (R1) | – | 44.00 [43.00, 45.50] | 6.79 | 44 (40–47) | 0 of 30 | "
-        "44.94 (10.27) | 42.1 to 47.8",
-        "Unified, without incorrect | Fᵢ₊₁ (updated) | – | – | 41.5 (38.25–45) | 2 of 30 | – | –",
+        "method reading set n capped mean low high sd median quartile_1 quartile_3 first_mean "
+        "first_sd paper_mean paper_sd predicted_low predicted_high",
+        (
+            *("adaboost", "", NONE, 30, 0, 44.0, 43.0, 45.5, 6.789, 44.0, 40.0, 47.0),
+            *(43.5, 7.0, 44.94, 10.27, 42.06, 47.82),
+        ),
+        (
+            *("unified-incorrect", "at-once", NAMED, 30, 2, NAN, NAN, NAN, NAN, 41.5, 38.25, 45.0),
+            *[NAN] * 6,
+        ),
+    )
+    readable = readable_summary(summary)
+    assert readable.columns.tolist()[:3] == ["Method", "Reading", "Incorrect"]
+    assert shown(readable) == [
+        "AdaBoost-IRL (R1) | – | – | 44.00 [43.00, 45.50] | 6.79 | 44 (40–47) | 0 of 30 | "
+        "43.50 (7.00) | 44.94 (10.27) | 42.1 to 47.8",
+        "Unified, with incorrect | Fᵢ, maximum at once | named kinds | – | – | 41.5 (38.25–45) | "
+        "2 of 30 | – (–) | – | –",
     ]
 
 
 def test_readable_contrasts_by_hand() -> None:
     """Methods have their labels, numbers their intervals, and small p-values no false digits."""
     contrasts = table(
-        "x y reading difference low high sd_ratio sd_low sd_high fewer p p_spread",
+        "x y reading set saved low high steps_saved sd_ratio sd_low sd_high fewer p p_spread",
         (
-            "unified",
-            "adaboost",
-            "printed",
-            -4.0,
-            -6.5,
-            -1.255,
-            0.5,
-            0.25,
-            0.751,
-            0.8,
-            0.00099,
-            0.04,
+            *("unified", "adaboost", "printed", NONE, 4.0, 1.255, 6.5),
+            *(0.0712, 0.5, 0.25, 0.751, 0.8, 0.00099, 0.04),
+        ),
+        (
+            *("unified-incorrect", "unified", "updated", GENERAL, -1.0, NAN, NAN),
+            *(-0.002, 1.0, NAN, NAN, 0.5, NAN, 1.0),
         ),
     )
     assert shown(readable_contrasts(contrasts)) == [
-        "Unified, without incorrect against AdaBoost-IRL (R1) | Fᵢ (printed) | "
-        "-4.00 [-6.50, -1.25] | 0.50 [0.25, 0.75] | 0.80 | < 0.001 | 0.040"
+        "Unified, without incorrect against AdaBoost-IRL (R1) | Fᵢ (printed) | – | "
+        "4.00 [1.25, 6.50] | 7.1% | 0.50 [0.25, 0.75] | 0.80 | < 0.001 | 0.040",
+        "Unified, with incorrect against Unified, without incorrect | Fᵢ₊₁ (updated) | "
+        "general list | -1.00 | -0.2% | 1.00 | 0.50 | – | 1.000",
     ]
 
 
 def test_readable_sets_by_hand() -> None:
-    """A set has one row: its pairs, and what it saves under both readings of Eq. 9."""
+    """A set has one row: its pairs, and what it saves and how often it acts under each reading."""
     sets = table(
-        "set reading demonstrations pairs leaving beside mean sd difference low high",
-        ("none", "printed", 0, 0, 0, 0, 40.0, 4.0, 0.0, 0.0, 0.0),
-        ("none", "updated", 0, 0, 0, 0, 38.0, 5.0, 0.0, 0.0, 0.0),
-        ("hit", "printed", 3, 20, 4, 6, 36.0, 3.0, -4.0, -6.0, -2.5),
-        ("hit", "updated", 3, 20, 4, 6, NAN, NAN, NAN, NAN, NAN),
+        "set reading demonstrations pairs leaving beside saved low high acted",
+        ("hit", "printed", 3, 20, 4, 6, 4.0, 2.5, 6.0, 0.0),
+        ("hit", "updated", 3, 20, 4, 6, NAN, NAN, NAN, 1.25),
+        ("opposite", "printed", 9, 30, 30, 0, -0.5, -1.0, 0.25, 40.0),
     )
     readable = readable_sets(sets)
-    assert readable.columns.tolist()[:5] == ["Set", "Demonstrations", "Pairs", "Leaving", "Beside"]
-    assert shown(readable) == [
-        "none | 0 | 0 | 0 | 0 | 40.00 (4.00) | – | 38.00 (5.00) | –",
-        "hit | 3 | 20 | 4 | 6 | 36.00 (3.00) | 4.00 [2.50, 6.00] | – (–) | –",
+    assert readable.columns.tolist() == [
+        *("Set", "Demonstrations", "Pairs", "Leaving", "Beside"),
+        *("Fᵢ (printed): saves", "Fᵢ (printed): acts"),
+        *("Fᵢ₊₁ (updated): saves", "Fᵢ₊₁ (updated): acts"),
     ]
+    assert shown(readable) == [
+        "hit | 3 | 20 | 4 | 6 | 4.00 [2.50, 6.00] | 0.00 | – | 1.25",
+        "opposite | 9 | 30 | 30 | 0 | -0.50 [-1.00, 0.25] | 40.00 | – | –",
+    ]
+
+
+def test_readable_kinds_by_hand() -> None:
+    """A kind has one row, and the head says of how many wrong trajectories the shares are."""
+    kinds = table(
+        "reading kind trajectories taken share",
+        ("printed", "hit", 200, 1, 0.005),
+        ("printed", "opposite", 200, 120, 0.6),
+        ("updated", "hit", 100, 0, 0.0),
+        ("updated", "opposite", 100, 50, 0.5),
+    )
+    readable = readable_kinds(kinds)
+    assert readable.columns.tolist() == ["Kind", "Fᵢ (printed), of 200", "Fᵢ₊₁ (updated), of 100"]
+    assert shown(readable) == ["hit | 0.5% | 0.0%", "opposite | 60.0% | 50.0%"]
 
 
 # --- judged claims ---------------------------------------------------------------------------
 
-JUDGED = pd.DataFrame(
-    [
-        ("A", "It is faster", "mean-difference", "printed", -4.0, -5.0, -3.0, -4.84, "reproduced"),
-        ("A", "It is faster", "mean-difference", "updated", -3.0, -4.0, -2.0, -4.84, "reproduced"),
-        ("B", "It is steadier", "sd-ratio", "printed", 0.5, 0.4, 0.6, 0.46, "reproduced"),
-        ("B", "It is steadier", "sd-ratio", "updated", 0.9, 0.8, 1.1, 0.46, "undecided"),
-        ("C", "Q grows", "mean", "printed", 0.1, -0.1, 0.3, np.nan, "not reproduced"),
-        ("C", "Q grows", "mean", "updated", 0.2, -0.1, 0.5, np.nan, "not reproduced"),
-        ("D", "Mean", "published-mean", "", 44.0, 43.0, 45.0, 44.94, "not testable"),
-        ("E", "A run", "published-run", "printed", 41.0, 30.5, 55.0, 47.0, "not testable"),
-        ("E", "A run", "published-run", "updated", np.nan, np.nan, np.nan, 47.0, "not testable"),
-        ("F", "SD", "published-sd", "printed", 6.8, 6.0, 7.7, 4.73, "not testable"),
-        ("F", "SD", "published-sd", "updated", 5.5, 4.8, 6.3, 4.73, "reproduced"),
-    ],
-    columns=["id", "claim", "statistic", "reading", "effect", "low", "high", "paper", "verdict"],
-).assign(
-    place="Fig. 6",
-    why=["", "", "", "a", "", "", "it was used", "two capped", "all capped", "calibrated", ""],
-)
+CELLS = "id claim statistic set reading effect low high p paper verdict why"
+JUDGED = table(
+    CELLS,
+    ("A", "It is faster", "saved", NONE, "printed", 4.0, 3.0, 5.0, 0.0, 4.84, SHOWN, ""),
+    ("A", "It is faster", "saved", NONE, "updated", 3.0, 2.0, 4.0, 0.0, 4.84, SHOWN, ""),
+    ("B", "It is steadier", "sd-ratio", NONE, "printed", 0.5, 0.4, 0.6, 0.0, 0.46, SHOWN, ""),
+    ("B", "It is steadier", "sd-ratio", NONE, "updated", 0.9, 0.8, 1.1, 0.2, 0.46, ABSENT, ""),
+    ("C", "It saves", "saved", NAMED, "printed", 0.1, -0.1, 0.3, 0.5, 3.62, ABSENT, ""),
+    ("C", "It saves", "saved", NAMED, "updated", 0.2, -0.1, 0.5, 0.4, 3.62, ABSENT, ""),
+    ("C", "It saves", "saved", NAMED, "at-once", 0.3, -0.1, 0.7, 0.3, 3.62, ABSENT, ""),
+    ("C", "It saves", "saved", GENERAL, "printed", 2.0, 1.0, 3.0, 0.0, 3.62, SHOWN, ""),
+    ("C", "It saves", "saved", GENERAL, "updated", 0.9, -1.0, 3.0, 0.3, 3.62, INCONCLUSIVE, ""),
+    ("C", "It saves", "saved", GENERAL, "at-once", -2.0, -3.0, -1.0, 0.0, 3.62, REVERSED, ""),
+    ("D", "Mean", "published-mean", NONE, "", 44.0, 43.0, 45.0, NAN, 44.94, NOT_TESTABLE, "used"),
+    ("E", "A run", "published-run", NONE, "printed", 41.0, 30.5, 55.0, 0.25, 47.0, "", "single"),
+    ("E", "A run", "published-run", NONE, "updated", 38.5, 28.0, 51.0, 0.0004, 47.0, "", "single"),
+    ("F", "SD", "published-sd", NONE, "printed", 6.8, 6.0, 7.7, NAN, 4.73, INCONSISTENT, ""),
+    ("F", "SD", "published-sd", NONE, "updated", 5.0, 4.8, 5.3, NAN, 4.73, CONSISTENT, ""),
+    ("G", "Growth", "mean", NONE, "printed", NAN, NAN, NAN, NAN, NAN, NOT_TESTABLE, "2 at the cap"),
+    ("G", "Growth", "mean", NONE, "updated", 0.1, 0.05, 0.2, 0.01, NAN, SHOWN, ""),
+).assign(place="Fig. 6")
+SENTENCES = {
+    "A": "shown in every cell",
+    "B": "shown under Fᵢ (printed), absent under Fᵢ₊₁ (updated)",
+    "C": "named kinds: absent under every reading; general list: shown under Fᵢ (printed), "
+    "inconclusive under Fᵢ₊₁ (updated), reversed under Fᵢ, maximum at once",
+    "D": "not testable: used",
+    "E": "p = 0.250, p < 0.001",
+    "F": "inconsistent under Fᵢ (printed), consistent under Fᵢ₊₁ (updated)",
+    "G": "not testable under Fᵢ (printed), shown under Fᵢ₊₁ (updated)",
+}
 
 
 def test_readable_verdicts_by_hand() -> None:
-    """One row a claim: effects of both readings in their own unit, and the verdict of both."""
+    """A row for each claim and set; the cells of its readings have verdict, effect and interval."""
     readable = readable_verdicts(JUDGED)
-    head = "Claim | Place | Paper | Fᵢ (printed) | Fᵢ₊₁ (updated) | Verdict"
-    assert " | ".join(readable.columns) == head
+    assert " | ".join(readable.columns) == (
+        "Claim | Place | Paper | Incorrect | Fᵢ (printed) | Fᵢ₊₁ (updated) | Fᵢ, maximum at once"
+    )
     assert shown(readable.drop(columns="Place")) == [
-        "It is faster | -4.84 | -4.00 [-5.00, -3.00] | -3.00 [-4.00, -2.00] | **reproduced**",
-        "It is steadier | × 0.46 | × 0.50 [0.40, 0.60] | × 0.90 [0.80, 1.10] | "
-        "partly (Fᵢ reproduced, Fᵢ₊₁ undecided)",
-        "Q grows | – | 0.10 [-0.10, 0.30] | 0.20 [-0.10, 0.50] | not reproduced",
-        "Mean | 44.94 | 44.00 [43.00, 45.00] | – | not testable: it was used",
-        "A run | 47.00 | median 41; 30 to 55 | – | not testable: two capped",
-        "SD | 4.73 | 6.80 [6.00, 7.70] | 5.50 [4.80, 6.30] | not testable: calibrated",
+        "It is faster | 4.84 | – | **shown** 4.00 [3.00, 5.00] | **shown** 3.00 [2.00, 4.00] | –",
+        "It is steadier | × 0.46 | – | **shown** × 0.50 [0.40, 0.60] | "
+        "absent × 0.90 [0.80, 1.10] | –",
+        "It saves | 3.62 | named kinds | absent 0.10 [-0.10, 0.30] | absent 0.20 [-0.10, 0.50] | "
+        "absent 0.30 [-0.10, 0.70]",
+        " | 3.62 | general list | **shown** 2.00 [1.00, 3.00] | inconclusive 0.90 [-1.00, 3.00] | "
+        "reversed -2.00 [-3.00, -1.00]",
+        "Mean | 44.94 | – | not testable 44.00 [43.00, 45.00] | – | –",
+        "A run | 47.00 | – | median 41; p = 0.250 | median 38.5; p < 0.001 | –",
+        "SD | 4.73 | – | inconsistent 6.80 [6.00, 7.70] | consistent 5.00 [4.80, 5.30] | –",
+        "Growth | – | – | not testable: 2 at the cap | **shown** 0.10 [0.05, 0.20] | –",
     ]
 
 
-def test_verdict_lines_have_the_verdict_first() -> None:
-    """On a terminal there is a line a claim: verdict, the paper's value, ours, and the claim."""
-    head, *lines = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
-    assert head.split() == ["verdict", "paper", "Fᵢ", "(printed)", "Fᵢ₊₁", "(updated)", "claim"]
-    cells = ["partly", "× 0.46", "× 0.50 [0.40, 0.60]", "× 0.90 [0.80, 1.10]"]
-    assert re.split(r"  +", lines[1]) == [*cells, "steadier than AdaBoost-IRL"]
-    for line, (id, part) in zip(lines, JUDGED.groupby("id"), strict=True):
-        assert line[:16].rstrip() == overall(part["verdict"].tolist())
-        assert line.endswith(str(id)) or id == "B"
+@pytest.mark.parametrize("id", SENTENCES)
+def test_a_sentence_has_the_verdict_of_every_cell(id: str) -> None:
+    """What cells have in common is said once, and each that differs is named."""
+    assert sentence(JUDGED[JUDGED["id"] == id]) == SENTENCES[id]
 
 
-def test_published_verdicts_fit_on_a_terminal() -> None:
-    """No line of the published verdicts is longer than 100 columns, and no two columns touch."""
-    for line in verdict_lines(read_table(PROJECT / "figures" / "claims" / "verdicts.csv")):
-        assert len(line) <= 100
-        assert len(re.split(r"  +", line)) == 5
+def test_a_single_cell_is_its_verdict() -> None:
+    """A claim with one cell is not said to hold in every one."""
+    assert sentence(JUDGED.head(1)) == "shown"
+
+
+def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
+    """Each claim that was predicted has a row; one whose number was used up has none."""
+    ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-UNIFIED-OPEN"}
+    judged = JUDGED[JUDGED["id"].isin([*ids])].replace({"id": ids})
+    assert shown(readable_predictions(judged)) == [
+        f"{ids[id]} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
+        for id in ("A", "B")
+    ]
+
+
+def test_verdict_lines_have_the_claim_and_its_sentence() -> None:
+    """On a terminal there is a line a claim: what it says, and its verdicts, lined up."""
+    lines = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
+    width = len("steadier than AdaBoost-IRL")
+    for line, (id, said) in zip(lines, SENTENCES.items(), strict=True):
+        name = "steadier than AdaBoost-IRL" if id == "B" else id
+        assert line == f"{name:<{width}}  {said}"
 
 
 def test_verdicts_read_the_same_from_a_file(tmp_path: Path) -> None:
