@@ -41,6 +41,7 @@ NAMES = {
     "F-START": "F₀",
     "Q-START": "whether Q is kept or reset in each iteration",
     "TIES": "how ties are broken",
+    "TIE-TOLERANCE": "the tolerance of ties",
     "W-START": "the first weights",
     "ADABOOST-RULE": "the rule of AdaBoost-IRL",
 }
@@ -82,15 +83,21 @@ def rounded(table: pd.DataFrame) -> str:
     most = none.loc[none["difference"].abs().idxmax()]
     same = others[(others["arithmetic"] == "fused") & (others["tolerance"] > 0)]["equal"].min()
     failing = [f"{t:g}" for t, rows in others.groupby("tolerance") if rows["p_holm"].min() < LEVEL]
-    rule = "which is our default" if taken == default else f"NOT our default of {default:g}"
+    if taken is None:
+        rule = "At none of them is there no difference"
+    else:
+        own = "which is our default" if taken == default else f"NOT our default of {default:g}"
+        rule = f"The least tolerance at which none is shown is {taken:g}, {own}"
+    single = others[(others["arithmetic"] == "single") & (others["tolerance"] > 0)]
+    alike = [f"{rows['equal'].min():.0%} at {t:g}" for t, rows in single.groupby("tolerance")]
     return (
         f"Without a tolerance the mean changes by up to {abs(most.difference):.1f} iterations "
         f"({full_label(most.method, most.reading)}, {most.arithmetic}, {most.task}). With any of "
         f"the tolerances at least {same:.0%} of the trials of a setting have the same number of "
         f"iterations in double and fused arithmetic. A difference is shown at a tolerance of "
-        f"{', '.join(failing) or 'none'}. The least tolerance at which none is shown is "
-        f"{taken:g}, {rule}. In single precision values differ by more than small tolerances, so "
-        "that agreement trial by trial begins at 1e-06."
+        f"{', '.join(failing) or 'none'}. {rule}. In single precision, in which values differ by "
+        f"more than a small tolerance, at least so many trials have the same number: "
+        f"{', '.join(alike)}."
     )
 
 
@@ -110,7 +117,7 @@ def calibrated(screen: pd.DataFrame, final: pd.DataFrame) -> str:
     ]
     follows = "They are our defaults" if rule_follows(final) else "They are NOT our defaults"
     for trace, point in nearest(final).items():
-        row = final[(final[[*WORLD, *TRACE, "F-INDEX"]] == point).all(axis=1)]
+        row = final[(final[[*WORLD, *TRACE, "F-INDEX"]] == list(point)).all(axis=1)]
         values = ", ".join(
             f"{id} = {value}" for id, value in zip((*WORLD, *TRACE), point, strict=False)
         )

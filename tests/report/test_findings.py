@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
-from replication.evidence.calibration import CALIBRATED, PAIR, TRIALS, chosen, grid, kl_divergence
+from replication.evidence.calibration import PLAINEST, TRACE, WORLD, chosen, points
 from replication.evidence.claims import criteria_hash, load_claims
+from replication.evidence.rounding import settings, variants
 from replication.evidence.sensitivity import HOLDS, OPEN, REVERSED, UNDEFINED
 from replication.evidence.specifications import Specification, load_specifications
-from replication.evidence.tables import read_table
-from replication.files import PROJECT
+from replication.irl.methods import TRACES
+from replication.paper.register import load_choices
 from replication.report.findings import (
     NAMES,
     at_once,
@@ -23,9 +23,10 @@ from replication.report.findings import (
     dependence,
     one_at_a_time,
     rechecked,
+    rounded,
 )
+from replication.report.readable import F_LABELS
 
-FIGURES = PROJECT / "figures"
 RULES: dict[str, tuple[Any, ...]] = {
     "ADABOOST-RULE": ("mismatch", "graded"),
     "TIES": ("random", "first"),
@@ -36,95 +37,136 @@ RULES: dict[str, tuple[Any, ...]] = {
 
 
 def test_caveats_name_seeds_notes_and_criteria() -> None:
-    """Below the verdicts stand every note, the seeds judged and explored, and the hash."""
+    """Below the verdicts stand every note, the seeds judged and known before, and the hash."""
     text = caveats(load_claims(), pd.DataFrame({"seed": [3, 3, 4]}))
     assert "these trials have root seed 3, 4." in text
     assert criteria_hash()[:16] in text
     for claim in load_claims().claim:
-        assert claim.note in text
-    for run in load_claims().explored:
-        assert f"{', '.join(map(str, run.root_seeds))}: {run.what}" in text
+        assert not claim.note or f"- {claim.id}: {claim.note}" in text
+    for run in load_claims().known:
+        seeds = ", ".join(map(str, run.root_seeds))
+        assert f"- {run.what}" in text
+        assert not seeds or f"{seeds})" in text
+
+
+# --- rounding --------------------------------------------------------------------------------
+
+LEAST = load_choices()["TIE-TOLERANCE"].default
+
+
+def some_rounding(**p_values: float) -> pd.DataFrame:
+    """Make up how the iterations depend on rounding, given the p-value at each tolerance."""
+    rows = []
+    for (task, method, reading), (tolerance, arithmetic) in product(settings(), variants()):
+        row = {"task": task, "method": method, "reading": reading, "tolerance": tolerance}
+        none = tolerance == 0
+        row |= {"arithmetic": arithmetic, "difference": -6.25 if none else 0.5}
+        row["equal"] = {"double": 1.0, "fused": 0.97, "single": 0.4}[str(arithmetic)]
+        row["p_holm"] = p_values.get(f"{tolerance:g}", 1.0) if arithmetic == "single" else 1.0
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def test_the_tolerance_of_the_rule_is_held_against_the_default() -> None:
+    """The least tolerance without a difference is named, and whether it is ours."""
+    text = rounded(some_rounding(**{"0": 0.001}))
+    assert "changes by up to 6.2 iterations (AdaBoost-IRL (R1), fused, open-maze)" in text
+    assert "at least 97% of the trials of a setting" in text
+    assert "A difference is shown at a tolerance of 0. The least tolerance" in text
+    assert f"is {LEAST:g}, which is our default." in text
+    assert "the same number: 40% at 1e-12, 40% at 1e-09, 40% at 1e-06, 40% at 0.001." in text
+    text = rounded(some_rounding(**{"0": 0.001, "1e-12": 0.04}))
+    assert "shown at a tolerance of 0, 1e-12. The least" in text
+    assert f"is 1e-09, NOT our default of {LEAST:g}." in text
+
+
+def test_no_tolerance_may_do() -> None:
+    """If a difference is shown at each tolerance the text says so."""
+    text = rounded(some_rounding(**{f"{t:g}": 0.0 for t, _ in variants()}))
+    assert "At none of them is there no difference." in text
 
 
 # --- calibration -----------------------------------------------------------------------------
 
-
-def near(table: pd.DataFrame) -> pd.Series:
-    """Return which points have both numbers where those of a sample of the paper's would lie."""
-    n = int(table["n"].iloc[0])
-    half = stats.t.ppf(0.975, PAIR.n - 1) * PAIR.sd * (1 / n + 1 / PAIR.n) ** 0.5
-    ratio = (table["sd"] / PAIR.sd) ** 2  # of variances: F with n - 1 and 99 degrees of freedom
-    inside = ratio.between(*stats.f(n - 1, PAIR.n - 1).interval(0.95))
-    return ((table["mean"] - PAIR.mean).abs() <= half) & inside & (table["capped"] == 0)
+COLUMNS = [*WORLD, *TRACE, "F-INDEX"]
 
 
-def made_up() -> pd.DataFrame:
-    """Make a table of the grid up."""
-    rng = np.random.default_rng(4)
-    table = pd.DataFrame(grid(), columns=list(CALIBRATED))
-    table["n"], table["capped"] = TRIALS, 0
-    table["mean"], table["sd"] = rng.normal(40, 3, 120), rng.uniform(2, 8, 120)
-    capped = table.index % 7 == 0
-    table.loc[capped, ["mean", "sd"]] = np.nan
-    table.loc[capped, "capped"] = 2
-    table["kl_divergence"] = [
-        kl_divergence(*row, PAIR) for row in zip(table["mean"], table["sd"], strict=True)
-    ]
-    table["default"] = [point == chosen() for point in grid()]
-    return table.sort_values("kl_divergence", ignore_index=True)
+def made_up(*, least: int = 0) -> pd.DataFrame:
+    """Make up finalists of two worlds, the nearest first; the first world is that of the default.
+
+    `least` is the first of them that does not fit.
+    """
+    default = [chosen(trace) for trace in TRACES]
+    world = default[0][:3]
+    other = next(point[:3] for point in points() if point[:3] != world)
+    rest = [(*other, *point[3:]) for point in default]
+    table = pd.DataFrame([*default, *rest], columns=COLUMNS)
+    order = np.arange(len(table))
+    return table.assign(
+        n=200, mean=40 + order, sd=5.0, kl_divergence=order / 10, fits=order < least
+    )
 
 
-def test_points_that_would_do_are_counted() -> None:
-    """The number of points and their values are those of a recount; the best one is named."""
-    table = made_up()
-    text = calibrated(table)
-    assert 0 < near(table).sum() < 120
-    assert f"But {near(table).sum()} of the 120 points" in text
-    best = table.iloc[0]
-    assert f"mean of {best['mean']:.2f} (SD {best['sd']:.2f}) in {TRIALS} trials" in text
-    assert ", ".join(f"{id} = {best[id]}" for id in CALIBRATED) in text
-    for id in CALIBRATED:
-        values = sorted(table[near(table)][id].unique())
-        assert f"{id}: {', '.join(map(str, values))}" in text
+def test_what_the_rule_takes_is_named() -> None:
+    """The number of points, those that fit, and the point of each trace with its numbers."""
+    final = made_up(least=3)
+    text = calibrated(pd.DataFrame(index=range(240)), final)
+    assert text.startswith("Of 240 points 4 went on to the second stage; 3 of them fit")
+    for trace, mean in zip(TRACES, (40, 41), strict=True):
+        values = zip((*WORLD, *TRACE), chosen(trace), strict=False)
+        named = ", ".join(f"{id} = {value}" for id, value in values)
+        numbers = f"with a mean of {mean:.2f} (SD 5.00) in 200 trials: it fits"
+        assert f"Under {F_LABELS[trace]} the rule takes {named}, {numbers}." in text
+    assert text.endswith("They are our defaults.")
 
 
-def test_nearest_point_is_said_to_be_the_default_or_not() -> None:
-    """The text says so if the nearest point is not what the register has."""
-    table = made_up()
-    table["default"] = False
-    assert calibrated(table).startswith("The nearest point is NOT our default: ")
-    table.loc[0, "default"] = True
-    assert calibrated(table).startswith("The nearest point is our default: ")
+def test_another_nearest_point_is_not_said_to_be_the_default() -> None:
+    """If the nearest world is another, the text says that it is not ours."""
+    final = made_up(least=4)
+    final["kl_divergence"] = final["kl_divergence"].to_numpy()[::-1]
+    assert calibrated(final, final).endswith("They are NOT our defaults.")
 
 
-def test_published_grid_is_recounted() -> None:
-    """What the notebook says of the grid counts the points of the published table."""
-    if not (FIGURES / "calibration").exists():
-        pytest.skip("figures/calibration is not published yet")
-    stored = read_table(FIGURES / "calibration" / "grid.csv")
-    assert f"But {near(stored).sum()} of the 120 points" in calibrated(stored)
+def test_a_trace_whose_nearest_point_does_not_fit_is_told() -> None:
+    """Where one trace fits and the other does not, both are said."""
+    text = calibrated(made_up(), made_up(least=1))
+    assert text.count(": it fits.") == 1
+    assert text.count(": it does not fit.") == 1
+
+
+def test_without_a_fit_the_plainest_point_is_taken() -> None:
+    """If nothing fits, the rule takes the middle of each range, with no number beside it."""
+    text = calibrated(made_up(), made_up())
+    assert "0 of them fit" in text
+    named = ", ".join(f"{id} = {v}" for id, v in zip((*WORLD, *TRACE), PLAINEST, strict=True))
+    for trace in TRACES:
+        assert f"Under {F_LABELS[trace]} the rule takes {named}." in text
 
 
 @pytest.mark.parametrize(
     ("mean", "sd", "text"),
     [
-        (40.0, 4.7, "both are inside"),
-        (40.0, 9.4, "the mean is inside"),
-        (43.0, 4.7, "the SD is inside"),
-        (37.0, 9.4, "neither is inside"),
+        (40.0, 4.7, "the mean is where the published distribution predicts it, the SD is."),
+        (40.0, 9.4, "the mean is where the published distribution predicts it, the SD is not."),
+        (43.0, 4.7, "the mean is not where the published distribution predicts it, the SD is."),
+        (37.0, 9.4, "the mean is not where the published distribution predicts it, the SD is not."),
     ],
 )
 def test_new_trials_are_held_against_the_prediction(mean: float, sd: float, text: str) -> None:
-    """Mean and SD of new trials are each held against where they would lie."""
+    """Mean and SD of each trace's judging trials are held against where they would lie."""
     check = pd.DataFrame(
-        {"n": [30, 100, 100], "reading": ["printed", "printed", "updated"]}
-        | {"mean": [40.0, mean, 33.0], "sd": [5.0, sd, 6.0]}
+        {"n": [200, 1000, 200, 1000], "trials": ["calibration", "judging"] * 2}
+        | {"reading": ["printed"] * 2 + ["updated"] * 2}
+        | {"mean": [40.0, mean, 40.0, 33.0], "sd": [5.0, sd, 5.0, 6.0]}
         | {"predicted_low": 38.8, "predicted_high": 41.4}
         | {"sd_predicted_low": 3.9, "sd_predicted_high": 5.7}
     )
-    assert text in rechecked(check)
-    assert "best of 120 noisy points, each known from 30 trials" in rechecked(check)
-    assert "Fᵢ₊₁ (updated) inherits the point, and has 33.00 (6.00)" in rechecked(check)
+    first, second = rechecked(check).split(" Under ")
+    assert first == (
+        f"Under Fᵢ (printed) the judging run has a mean of {mean:.2f} (SD {sd:.2f}) in 1000 "
+        f"trials: {text}"
+    )
+    assert second.startswith("Fᵢ₊₁ (updated) the judging run has a mean of 33.00 (SD 6.00)")
 
 
 # --- specifications --------------------------------------------------------------------------
@@ -146,7 +188,7 @@ def ruled(claim: str, statistic: str, by_rule: dict[str, float]) -> pd.DataFrame
 
 def test_claims_are_counted_with_and_without_caps() -> None:
     """Each claim has its counts, whose trials are at the cap, and what is left without them."""
-    table = ruled("FASTER", "mean-difference", {"mismatch": 0.0, "graded": -150.0})
+    table = ruled("FASTER", "saved", {"mismatch": 0.0, "graded": -150.0})
     table.loc[0, ["effect", "low", "high", "outcome"]] = [-4.0, -5.0, -3.0, HOLDS]
     zero = ruled("ZERO-OPEN", "share", {"mismatch": 1.0, "graded": 0.0})
     zero["outcome"] = np.where(zero["effect"] > 0.9, HOLDS, REVERSED)
@@ -163,7 +205,7 @@ def test_claims_are_counted_with_and_without_caps() -> None:
 
 def test_caps_of_the_first_method_are_not_put_on_the_other() -> None:
     """If the claim's own method has trials at the cap nothing is said of whose they are."""
-    table = ruled("FASTER", "mean-difference", {"mismatch": 0.0, "graded": -150.0})
+    table = ruled("FASTER", "saved", {"mismatch": 0.0, "graded": -150.0})
     table.loc[table["capped"] > 0, "capped_x"] = 1
     (text,) = at_once(table)
     assert "end at the iteration cap; it holds in 0 of the 40 others." in text
@@ -172,7 +214,7 @@ def test_caps_of_the_first_method_are_not_put_on_the_other() -> None:
 
 def test_claim_that_depends_on_nothing_is_counted_alone() -> None:
     """Where no choice has a share of the variance none is named; missing effects are counted."""
-    table = ruled("STEADIER", "mean-difference", {"mismatch": 1.0, "graded": 1.0})
+    table = ruled("STEADIER", "saved", {"mismatch": 1.0, "graded": 1.0})
     table["capped"] = 0
     table.loc[:19, ["effect", "low", "high", "outcome"]] = [np.nan, np.nan, np.nan, UNDEFINED]
     assert at_once(table) == [
@@ -210,7 +252,7 @@ def test_single_changes_that_move_a_claim_are_named() -> None:
 
 def test_dependence_lists_mazes_and_soccer_apart() -> None:
     """The Markdown has three lists, and how far chance goes."""
-    table = ruled("SAVES-OPEN", "mean-difference", {"mismatch": 0.0, "graded": -150.0})
+    table = ruled("SAVES-OPEN", "saved", {"mismatch": 0.0, "graded": -150.0})
     lines = dependence(pd.concat([table, single()], ignore_index=True)).splitlines()
     assert [line for line in lines if line.endswith(":")] == [
         "All choices at once:",
@@ -233,7 +275,7 @@ def test_every_choice_of_the_factorial_has_a_name() -> None:
 
 def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
     """The rule of AdaBoost-IRL does not act on savings: its shares differ by chance alone."""
-    table = ruled("SAVES-OPEN", "mean-difference", {"mismatch": 0.0, "graded": 0.0})
+    table = ruled("SAVES-OPEN", "saved", {"mismatch": 0.0, "graded": 0.0})
     table.loc[[0, 1, 2, 3], "outcome"] = HOLDS
     held = table[table["outcome"] == HOLDS]["capped"].eq(10)
     few, most = sorted((held.sum() / 40, (~held).sum() / 40))
