@@ -41,6 +41,7 @@ NAMES = {
     "F-START": "F₀",
     "Q-START": "whether Q is kept or reset in each iteration",
     "TIES": "how ties are broken",
+    "TIE-TOLERANCE": "which values count as tied",
     "W-START": "the first weights",
     "ADABOOST-RULE": "the rule of AdaBoost-IRL",
 }
