@@ -97,7 +97,7 @@ def draw_profile(numbers: pd.DataFrame) -> Figure:
         x, tied, rounded = (rows[name].to_numpy() for name in ("step", "tied", "rounded"))
         panel.bar(x, 100 * rounded, width=0.9, color="#D55E00")
         panel.bar(x, 100 * tied, width=0.9, bottom=100 * rounded, color="0.75")
-        panel.set_title(full_label(method, reading), size=8)
+        panel.set_title(full_label(method, reading).replace(", ", ",\n", 1), size=8)
         panel.set_xlabel("step of the expert's path")
     axes[0].set_ylabel("share of Q-tables (%)")
     handles = [
@@ -130,5 +130,6 @@ def readable_rounding(table: pd.DataFrame) -> pd.DataFrame:
             "More than double [95 %]": lambda row: interval(row.difference, row.low, row.high),
             "Equal trials": lambda row: f"{row.equal:.0%}",
             "p, Holm": lambda row: p_value(row.p_holm),
+            "Wrong pairs": lambda row: f"{row.wrong:.1f}",
         },
     )
