@@ -42,17 +42,16 @@ def draw_points(numbers: pd.DataFrame) -> Figure:
             if row.default:
                 panel.plot(row.mean, row.sd, "o", ms=11, mfc="none", mec="0.1", mew=1.2)
         mean, sd = numbers[["paper_mean", "paper_sd"]].iloc[0]
-        panel.plot(mean, sd, "*", ms=14, mfc="white", mec="#D0021B", mew=1.3, zorder=5)
+        panel.plot(mean, sd, "*", ms=14, mfc="none", mec="#D0021B", mew=1.3, zorder=5)
         panel.set(title=F_LABELS[trace], xlabel="mean of the iterations")
     axes[0].set_ylabel("SD of the iterations")
-    handles = [handle("a finalist: does not fit", "o", "0.55", mfc="white", lw=0)]
+    handles = [handle("does not fit, with 95 % intervals", "o", "0.55", mfc="white", lw=0.9)]
     if numbers["fits"].any():
-        handles.append(handle("a finalist: fits", "o", "#0072B2", lw=0))
+        handles.append(handle("fits", "o", "#0072B2", lw=0.9))
     if numbers["default"].any():
         handles.append(handle("default", "o", "0.1", ms=9, mfc="none", lw=0))
-    handles += [
-        handle(f"published ({mean:.2f}, {sd:.2f})", "*", "#D0021B", ms=10, mfc="white", lw=0),
-    ]
+    star = f"published ({mean:.2f}, {sd:.2f})"
+    handles.append(handle(star, "*", "#D0021B", ms=10, mfc="none", lw=0))
     legend_below(figure, handles)
     return figure
 

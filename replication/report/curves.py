@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from replication.evidence.experiments import GENERAL, under
@@ -124,8 +125,8 @@ def draw_errors(numbers: pd.DataFrame) -> Figure:
     panels = _panels(numbers)
     figure, axes = canvas(1, len(panels), height=3.2, sharex=True, sharey=True)
     for panel, (title, shown) in zip(axes, panels.items(), strict=True):
-        for line, rows in shown:
-            _draw_curve(panel, line, rows)
+        for place, (line, rows) in enumerate(shown):
+            _draw_curve(panel, line, rows, place)
         panel.set(title=title, xlabel="iteration")
     axes[0].set(ylabel="error d", xlim=(0, None), ylim=(0, None))
     handles: list[Artist] = [
@@ -140,9 +141,11 @@ def draw_errors(numbers: pd.DataFrame) -> Figure:
 
 
 PAPER: dict[str, Any] = {"marker": "v", "ms": 6, "mfc": "white"}
+TIPPED = PAPER | {"marker": ((-1, 1.8), (1, 1.8), (0, 0), (-1, 1.8)), "ms": 12}
+"""The paper's mark: centred at its place, and with its tip there, above what else is there."""
 
 
-def _draw_curve(panel: Axes, line: Line, rows: pd.DataFrame) -> None:
+def _draw_curve(panel: Axes, line: Line, rows: pd.DataFrame, place: int) -> None:
     colour, iterations = line.colour, rows["iteration"].to_numpy()
     low, high = rows["quartile_1"].to_numpy(), rows["quartile_3"].to_numpy()
     panel.fill_between(iterations, low, high, color=colour, alpha=0.18, lw=0)
@@ -151,10 +154,11 @@ def _draw_curve(panel: Axes, line: Line, rows: pd.DataFrame) -> None:
     drawn = rows["error"].to_numpy()
     end = int(np.argmax(drawn <= 0)) if (drawn <= 0).any() else len(drawn) - 1
     panel.plot(iterations[: end + 1], drawn[: end + 1], **_style(line))
-    panel.plot(end, drawn[end], "o", color=colour, ms=4, clip_on=False, zorder=4)
+    # The first dots are the largest, so that none is hidden where curves end together.
+    panel.plot(end, drawn[end], "o", color=colour, ms=6 - 1.3 * place, clip_on=False, zorder=4)
     paper = rows["paper"].iloc[0]
     if not np.isnan(paper):
-        panel.plot(paper, 0, ls="none", mec=colour, clip_on=False, zorder=5, **PAPER)
+        panel.plot(paper, 0, ls="none", mec=colour, clip_on=False, zorder=5, **TIPPED)
 
 
 def _style(line: Line) -> dict[str, Any]:
@@ -213,7 +217,8 @@ def draw_iterations(numbers: pd.DataFrame) -> Figure:
             left.plot(first["trial"].to_numpy(), first["iterations"].to_numpy(), **_style(line))
             _draw_distribution(right, position, line.colour, rows)
         left.set_title(title, loc="left")
-        left.set(ylabel="iterations", xlim=(-1, min(len(shown[0][1]), FIRST)))
+        left.set(ylabel="iterations", xlim=(-0.5, min(len(shown[0][1]), FIRST) - 0.5))
+        left.xaxis.set_major_locator(MaxNLocator(6, integer=True))
         right.set(xticks=[], xlim=(-0.7, len(shown) - 0.3))
         right.spines["bottom"].set_visible(False)
         right.tick_params(labelleft=False)
@@ -234,7 +239,8 @@ def _draw_distribution(panel: Axes, position: int, colour: str, rows: pd.DataFra
     panel.plot(position, rows["mean"].iloc[0], "o", color=colour, ms=5, zorder=4)
     paper = rows["paper"].iloc[0]
     if not np.isnan(paper):
-        panel.plot(position + 0.3, paper, ls="none", mec=colour, zorder=5, **PAPER)
+        style = {"ls": "none", "mec": colour, "clip_on": False, "zorder": 5, **PAPER}
+        panel.plot(position + 0.3, paper, **style)
 
 
 # --- sets of incorrect demonstrations --------------------------------------------------------

@@ -25,7 +25,7 @@ READING_MARKS = {
     "at-once": ("D", "#CC79A7"),
     "": ("o", "#222222"),
 }
-SMALL = 6.8
+SMALL = 7.0
 
 FAR = 8
 """How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""

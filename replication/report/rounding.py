@@ -59,16 +59,20 @@ def draw_tolerances(numbers: pd.DataFrame) -> Figure:
                 style: dict[str, Any] = {"color": colour, "lw": 1.1}
                 panel.vlines(x, rows["mean"] - half, rows["mean"] + half, **style)
                 panel.plot(x, rows["mean"], mark, ms=4, color=colour)
-            label = get_method(method).label.split(" (")[0].split(",")[0]
-            name = f"{label}, {F_LABELS[reading].split(' (')[0]}" if reading else label
-            panel.set_title(f"{TASKS[task]}\n{name}", size=8)
+            panel.set_title(f"{TASKS[task]}\n{_short_label(method, reading)}", size=8)
             panel.set_xticks(range(len(steps)), [_power(step) for step in steps])
     for line in axes:
-        line[0].set_ylabel("iterations, mean")
+        line[0].set_ylabel("mean iterations\n(95 % interval)")
     for panel in axes[-1]:
         panel.set_xlabel("tolerance (relative)")
     legend_below(figure, [handle(name, *mark) for name, mark in MARKS.items()])
     return figure
+
+
+def _short_label(method: str, reading: str) -> str:
+    """Return a method's label for a narrow panel; all are without incorrect demonstrations."""
+    label = get_method(method).label.partition(" (")[0].partition(",")[0]
+    return f"{label}, {F_LABELS[reading]}" if reading else label
 
 
 def _power(value: float) -> str:
@@ -97,7 +101,7 @@ def draw_profile(numbers: pd.DataFrame) -> Figure:
         x, tied, rounded = (rows[name].to_numpy() for name in ("step", "tied", "rounded"))
         panel.bar(x, 100 * rounded, width=0.9, color="#D55E00")
         panel.bar(x, 100 * tied, width=0.9, bottom=100 * rounded, color="0.75")
-        panel.set_title(full_label(method, reading).replace(", ", ",\n", 1), size=8)
+        panel.set_title(_short_label(method, reading), size=8)
         panel.set_xlabel("step of the expert's path")
     axes[0].set_ylabel("share of Q-tables (%)")
     handles = [

@@ -106,7 +106,7 @@ def draw_shares(numbers: pd.DataFrame) -> Figure:
     claims = list(dict.fromkeys(numbers.loc[numbers["choice"].isin(OUTCOMES), "claim"]))
     grid = numbers.pivot(index="claim", columns="choice", values="share").reindex(claims)
     figure, axes = canvas(
-        1, 3, height=1.7 + 0.32 * len(grid), sharey=True, width_ratios=(len(choices), 2, 5)
+        1, 3, height=1.7 + 0.32 * len(grid), sharey=True, width_ratios=(len(choices), 2.5, 5)
     )
     drawing.pad(figure, wspace=0.02, h_pad=0.08)
     for panel, columns, colours in zip(axes, (choices, others), ("Blues", "Greys"), strict=False):
@@ -137,7 +137,7 @@ def draw_shares(numbers: pd.DataFrame) -> Figure:
             axes[2].text(middle, row, text, size=7, ha="center", va="center_baseline", color=ink)
         start += part
     axes[2].set(xlim=(0, 1), xticks=[])
-    axes[2].set_xlabel("share of specifications (%)", size=7.5)
+    axes[2].set_xlabel("specifications (%)", size=7.5)
     axes[2].spines[:].set_visible(False)
     axes[2].tick_params(which="both", length=0, labelleft=False)
     axes[1].tick_params(labelleft=False)

@@ -16,7 +16,7 @@ from replication.evidence.claims import short_label
 from replication.evidence.sensitivity import HOLDS, LEVEL, UNDEFINED
 from replication.evidence.specifications import DEFAULT, default_of, named_choices, sort_key
 from replication.report import drawing
-from replication.report.drawing import OUTCOMES, handle
+from replication.report.drawing import OUTCOMES, SMALL, handle
 from replication.report.picture import Picture
 from replication.report.style import canvas, legend_below, settled
 
@@ -79,7 +79,7 @@ def draw_curve(numbers: pd.DataFrame) -> Figure:
             matrix.vlines(x[on], at - 0.4, at + 0.4, colors=colours, lw=0.9)
             share = float((outcome[on] == HOLDS).mean())
             shares.barh(at, share, height=0.8, color=OUTCOMES[HOLDS], alpha=0.35, lw=0)
-            shares.text(0.04, at, f"{share:.0%}", size=6.5, va="center_baseline")
+            shares.text(0.04, at, f"{share:.0%}", size=SMALL, va="center_baseline")
     drawing.shade_blocks(matrix, ids, y)
     bold = [pair for name in default["specification"] for pair in named_choices(name).items()]
     drawing.label_blocks(matrix, rows, y, bold)

@@ -72,7 +72,7 @@ class Study(Outputs):
         self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
         given = self.demos, self.choices, design.methods
         self.conditions = experiments.conditions_of(*given, design.sets)
-        self.sets = experiments.conditions_of(*given, sets)
+        self.sets = experiments.conditions_of(*given, sets) if sets else {}
         own = self.demos.task == experiment
         self.published: Mapping[str, Published] = PUBLISHED[experiment] if own else {}
         curves = PUBLISHED_CURVES.get(experiment, {})
@@ -93,7 +93,7 @@ class Study(Outputs):
     def main(self) -> pd.DataFrame:
         """The rows of the methods' own trials."""
         own = [tables.rows_of(self.trials, each) for each in self.conditions.values()]
-        return pd.concat(own, ignore_index=True)
+        return pd.concat([rows.head(self.number) for rows in own], ignore_index=True)
 
     def of(self, *methods: str) -> pd.DataFrame:
         """Return the rows of some methods' own trials."""

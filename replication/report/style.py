@@ -98,7 +98,10 @@ def canvas(n_rows: int, n_columns: int, *, height: float, **layout: Any) -> tupl
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
-    """Put a legend below all axes, in two rows where one row has no room for it."""
-    wide = sum(len(str(handle.get_label())) + 8 for handle in handles) > ROW
-    ncols = -(-len(handles) // 2) if wide else len(handles)
-    figure.legend(handles=handles, loc="outside lower center", ncols=ncols)
+    """Put a legend below all axes, in as many rows as its entries need."""
+    sizes = [len(str(handle.get_label())) + 8 for handle in handles]
+    for rows in range(1, len(sizes) + 1):
+        columns = np.array_split(sizes, -(-len(sizes) // rows))
+        if sum(map(max, columns)) <= ROW:
+            break
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(columns))

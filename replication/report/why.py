@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from replication.demos.model import Demos
@@ -64,6 +66,10 @@ ALONE = ("hit", "detour", "opposite", NAMED, GENERAL)
 """The sets whose savings are drawn."""
 
 
+PATH: dict[str, Any] = {"color": "0.55", "lw": 4, "alpha": 0.5, "solid_capstyle": "round"}
+WAY: dict[str, Any] = {"color": "#D55E00", "lw": 1.6}
+
+
 @settled
 def draw_why(numbers: pd.DataFrame) -> Figure:
     """Draw the three panels."""
@@ -71,12 +77,11 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
     cells = numbers[numbers["part"] == "map"].astype({"x": int, "y": int})
     draw_map(where, cells, grid=False)
     path = numbers[numbers["part"] == "path"]
-    where.plot(path["x"], path["y"], color="0.55", lw=4, alpha=0.5, solid_capstyle="round")
+    where.plot(path["x"], path["y"], **PATH)
     way = numbers[numbers["part"] == "trajectory"]
-    where.plot(way["x"], way["y"], color="#D55E00", lw=1.6)
-    where.plot(way["x"].iloc[-1], way["y"].iloc[-1], "o", color="#D55E00", ms=4)
+    where.plot(way["x"], way["y"], **WAY)
+    where.plot(way["x"].iloc[-1], way["y"].iloc[-1], "o", color=WAY["color"], ms=4)
     where.set(xticks=[], yticks=[], xlabel="", ylabel="")
-    where.set_title("after the first update", size=8)
 
     kinds = numbers[numbers["part"] == "kind"]
     names = list(dict.fromkeys(kinds["kind"]))
@@ -84,8 +89,10 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
     for place, reading in zip(_places(readings), readings, strict=True):
         rows = kinds[kinds["reading"] == reading].set_index("kind").loc[names]
         _, colour = READING_MARKS[reading]
-        y = np.arange(len(names)) + place
-        taken.barh(y, 100 * rows["share"], height=0.8 / len(readings), color=colour, alpha=0.75)
+        y, share = np.arange(len(names)) + place, 100 * rows["share"].to_numpy()
+        bars = taken.barh(y, share, height=0.8 / len(readings), color=colour, alpha=0.75)
+        taken.bar_label(bars, fmt="%.3g", padding=2, size=7)
+    taken.margins(x=0.15)
     taken.set_yticks(range(len(names)), names)
     taken.set_xlabel("wrong trajectories\nthat take such a pair (%)")
 
@@ -103,7 +110,11 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
     saves.set_xlabel("iterations saved\nby such demonstrations")
     for panel in (taken, saves):
         panel.invert_yaxis()
-    handles = [handle(F_LABELS[name], *READING_MARKS[name], lw=0) for name in readings]
+    handles = [
+        Line2D([], [], label="the expert's path", **PATH),
+        Line2D([], [], label="the agent's after the first update", **WAY),
+        *(handle(F_LABELS[name], *READING_MARKS[name], lw=1.3) for name in readings),
+    ]
     legend_below(figure, handles)
     return figure
 

@@ -6,7 +6,7 @@ import pytest
 from replication import Demos
 from replication.demos.soccer_expert import demonstrate_soccer
 from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import Key, method_conditions, set_conditions
+from replication.evidence.experiments import SETS, Key, conditions_of
 from replication.trials.condition import Condition
 from replication.trials.measures import measure_trials
 from replication.trials.results import Results
@@ -25,13 +25,13 @@ def soccer_demos() -> Demos:
 @pytest.fixture(scope="session")
 def conditions(small_demos: Demos) -> dict[Key, Condition]:
     """Return the conditions of every method in a small maze, with few episodes."""
-    return method_conditions(small_demos, FEW)
+    return conditions_of(small_demos, FEW)
 
 
 @pytest.fixture(scope="session")
 def sets(small_demos: Demos) -> dict[Key, Condition]:
     """Return those of the sets of incorrect demonstrations."""
-    return set_conditions(small_demos, FEW)
+    return conditions_of(small_demos, FEW, sets=SETS)
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -8,12 +10,13 @@ from IPython.core.interactiveshell import InteractiveShell
 
 from replication import Demos
 from replication.errors import UserError
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import conditions_of
 from replication.evidence.tables import read_table, write_csv
 from replication.progress import GIVEN
 from replication.report.maze import demonstrations
 from replication.report.moving import Player
-from replication.report.outputs import Outputs, Shown
+from replication.report.outputs import Outputs, Shown, Stage
+from replication.trials.condition import Condition
 from replication.trials.store import Store
 from replication.trials.table import Group, computed_table
 
@@ -67,43 +70,124 @@ def test_data_are_written_and_not_shown(tmp_path: Path) -> None:
 # --- trials ----------------------------------------------------------------------------------
 
 
+FEW = {"episodes": 60, "horizon": 40}
+
+
 @pytest.fixture
-def groups(small_demos: Demos) -> list[Group]:
-    """Plan two conditions of a small maze, of three trials each."""
-    conditions = method_conditions(small_demos, {"episodes": 60, "horizon": 40})
-    return [Group(list(conditions.values())[:2], 3)]
+def conditions(small_demos: Demos) -> list[Condition]:
+    """Return two conditions of a small maze."""
+    return list(conditions_of(small_demos, FEW).values())[:2]
+
+
+@pytest.fixture
+def stages(conditions: list[Condition]) -> list[Stage]:
+    """Plan two stages: three trials of two conditions, then two of the one that is faster."""
+
+    def first(_: pd.DataFrame) -> list[Group]:
+        return [
+            Group([one], 3, {"part": "screen", "number": number})
+            for number, one in enumerate(conditions)
+        ]
+
+    def then(trials: pd.DataFrame) -> list[Group]:
+        means = trials.groupby("number")["iterations"].mean()
+        fastest = int(means.idxmin())
+        return [Group([conditions[fastest]], 2, {"part": "final", "number": fastest})]
+
+    return [(3, first), (5, then)]
 
 
 def test_trials_are_computed_and_written(
-    tmp_path: Path, groups: list[Group], store_path: Path
+    tmp_path: Path, conditions: list[Condition], store_path: Path
 ) -> None:
     """The table that everything else is made from is the one that the file has."""
-    table = Outputs(tmp_path).computed(groups, errors=True, store=Store(store_path), seed=3)
+    groups, store = [Group(conditions, 3)], Store(store_path)
+    table = Outputs(tmp_path).computed((3, lambda _: groups), errors=True, store=store)
     pd.testing.assert_frame_equal(table, read_table(tmp_path / "trials.csv"))
-    expected = computed_table(groups, errors=True, store=Store(store_path), seed=3)
+    expected = computed_table(groups, errors=True, store=store, seed=3)
     pd.testing.assert_frame_equal(table, expected, check_dtype=False)
 
 
-def test_given_trials_are_taken_and_not_computed(
-    tmp_path: Path, groups: list[Group], store_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_later_stage_is_planned_by_the_trials_before(
+    tmp_path: Path, stages: list[Stage], store_path: Path
 ) -> None:
-    """A given table is used as it is, if its rows are those that were planned, in their order."""
-    store = Store(store_path)
-    given = tmp_path / "given" / "trials.csv"
-    changed = computed_table(groups, store=store, seed=3).assign(iterations=99)
-    write_csv(changed, given)
-    monkeypatch.setenv(GIVEN, str(given.parent))
-    table = Outputs(tmp_path / "out").computed(groups, store=store, seed=3)
-    assert set(table["iterations"]) == {99}
-    assert (tmp_path / "out" / "trials.csv").read_bytes() == given.read_bytes()
-    for rows, seed, message in (
-        (changed, 4, "see its column seed"),
-        (changed.iloc[:-1], 3, "5 trials instead of 6"),
-        (changed.iloc[[1, 0, 2, 3, 4, 5]], 3, "see its column trial"),
-        (changed.iloc[[0, 1, 2, 3, 4, 4]], 3, "see its column trial"),
-        (changed.assign(set="all"), 3, "see its column set"),
-        (changed.drop(columns="reading"), 3, "see its column reading"),
-    ):
-        write_csv(rows, given)
-        with pytest.raises(UserError, match=message):
-            Outputs(tmp_path / "out").computed(groups, store=store, seed=seed)
+    """Each stage sees all trials of those before, and its own have the seed of the stage."""
+    table = Outputs(tmp_path).computed(*stages, store=Store(store_path))
+    pd.testing.assert_frame_equal(table, read_table(tmp_path / "trials.csv"))
+    assert table["part"].tolist() == ["screen"] * 6 + ["final"] * 2
+    assert table["seed"].tolist() == [3] * 6 + [5] * 2
+    screen, final = (table[table["part"] == part] for part in ("screen", "final"))
+    means = screen.groupby("number")["iterations"].mean()
+    assert set(final["number"]) == {means.idxmin()}
+
+
+def given(folder: Path, table: pd.DataFrame, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give a table of trials to notebooks; return its file."""
+    monkeypatch.setenv(GIVEN, str(folder / "given"))
+    return write_csv(table, folder / "given" / "trials.csv")
+
+
+def test_given_trials_are_taken_and_not_computed(
+    tmp_path: Path, stages: list[Stage], store_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A given table is used as it is, whatever its measures are, if its trials are the planned."""
+    table = Outputs(tmp_path).computed(*stages, store=Store(store_path))
+    file = given(tmp_path, table.assign(early_errors=99), monkeypatch)
+    monkeypatch.setattr("replication.report.outputs.computed_table", None)
+    taken = Outputs(tmp_path / "out").computed(*stages, store=None)
+    assert set(taken["early_errors"]) == {99}
+    assert (tmp_path / "out" / "trials.csv").read_bytes() == file.read_bytes()
+
+
+def slower(table: pd.DataFrame) -> pd.DataFrame:
+    """Let the condition that went on to the second stage be the slower one."""
+    chosen = table["number"] == table["number"].iloc[-1]
+    raised = chosen & (table["part"] == "screen")
+    return table.assign(iterations=table["iterations"].where(~raised, 500))
+
+
+FORGED: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
+    "last one missing": (lambda t: t.iloc[:-1], "has 7 trials instead of 8"),
+    "first stage alone": (lambda t: t.iloc[:6], "has 6 trials instead of 8"),
+    "half a stage": (lambda t: t.iloc[:4], "has 4 trials instead of 6"),
+    "none": (lambda t: t.iloc[:0], "has 0 trials instead of 6"),
+    "one more": (lambda t: t.iloc[[*range(8), 7]], "has 9 trials instead of 8"),
+    "reordered": (lambda t: t.iloc[[1, 0, *range(2, 8)]], "see its column trial"),
+    "reordered later": (lambda t: t.iloc[[*range(6), 7, 6]], "see its column trial"),
+    "stages exchanged": (lambda t: t.iloc[[6, 7, *range(6)]], "see its column part"),
+    "one twice": (lambda t: t.iloc[[*range(7), 6]], "see its column trial"),
+    "seed": (lambda t: t.assign(seed=4), "see its column seed"),
+    "seed of the first stage": (lambda t: t.assign(seed=3), "see its column seed"),
+    "set": (lambda t: t.assign(set="all"), "see its column set"),
+    "number": (lambda t: t.assign(number=1 - t["number"]), "see its column number"),
+    "no reading": (lambda t: t.drop(columns="reading"), "see its column reading"),
+    "another winner": (slower, "see its column number"),
+}
+
+
+@pytest.fixture(scope="module")
+def finished(
+    small_demos: Demos, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[list[Stage], pd.DataFrame]:
+    """Compute both stages once."""
+    conditions: Any = list(conditions_of(small_demos, FEW).values())[:2]
+    plan: list[Stage] = stages.__wrapped__(conditions)  # type: ignore[attr-defined]
+    folder = tmp_path_factory.mktemp("stages")
+    return plan, Outputs(folder).computed(*plan, store=Store(folder / "trials.sqlite"))
+
+
+@pytest.mark.parametrize("forgery", FORGED)
+def test_other_trials_than_the_planned_are_refused(
+    forgery: str,
+    finished: tuple[list[Stage], pd.DataFrame],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Missing, extra, reordered and forged rows are one line, in whichever stage; none is kept."""
+    (plan, table), (forge, message) = finished, FORGED[forgery]
+    file = given(tmp_path, forge(table), monkeypatch)
+    with pytest.raises(UserError, match=message) as caught:
+        Outputs(tmp_path / "out").computed(*plan, store=None)
+    assert str(caught.value).startswith(f"{file} has ")
+    assert "\n" not in str(caught.value)
+    assert list((tmp_path / "out").iterdir()) == []

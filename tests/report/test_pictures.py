@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from replication import Demos
-from replication.evidence.experiments import Key
-from replication.evidence.tables import read_table, sets_table, write_csv
+from replication.evidence.experiments import NONE, Key
+from replication.evidence.tables import kinds_table, read_table, sets_table, write_csv
 from replication.paper.published import FIGURE_5, TABLE_1
-from replication.report import curves, field, maze
+from replication.report import curves, field, maze, why
 from replication.report.learned import fit_figure
 from replication.report.picture import Picture
 from replication.report.style import save_figure
@@ -27,8 +27,11 @@ from replication.trials.results import Results
 
 KINDS = [
     *("map", "map without incorrect", "surfaces", "errors", "errors of one", "iterations"),
-    *("sets", "no sets", "field", "soccer", "soccer without incorrect"),
+    *("sets", "why", "field", "soccer", "soccer without incorrect"),
 ]
+
+
+SHOWN = {"none", "hit", "detour", "near-detour", "far-detour", "opposite"}
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +44,10 @@ def pictures(
     trials: pd.DataFrame,
 ) -> dict[str, Picture]:
     """Make each kind of picture once, of a few trials in a small maze and of the soccer field."""
-    every = [*conditions.values(), *sets.values()]
-    saved = sets_table(measure_trials(results, every).drop_duplicates(ignore_index=True), sets)
-    traced = results.trial(conditions["unified", "printed"], 0, snapshots=True)
+    every = {**conditions, **sets}
+    saved = sets_table(measure_trials(results, every.values()), every)
+    key = "unified", "printed", NONE
+    traced = results.trial(conditions[key], 0, snapshots=True)
     one = trials[trials["method"] == "adaboost"]
     return {
         "map": maze.demonstrations(small_demos),
@@ -53,7 +57,7 @@ def pictures(
         "errors of one": curves.errors(one, {}, median=True),
         "iterations": curves.iterations(trials, TABLE_1),
         "sets": curves.sets(saved),
-        "no sets": curves.sets(saved[saved["set"] == "none"]),
+        "why": why.why(kinds_table(trials), saved, {key: traced}, small_demos),
         "field": field.start(soccer_demos.environment),
         "soccer": field.demonstrations(soccer_demos),
         "soccer without incorrect": field.demonstrations(soccer_demos.select("none")),
@@ -140,8 +144,9 @@ def test_files_hold_keys(kind: str, tables: dict[str, pd.DataFrame]) -> None:
     table = tables[kind]
     assert all(name.isidentifier() for name in table.columns)
     if "method" in table:
-        assert set(table["method"]) <= {"adaboost", "unified", "unified-incorrect"}
-        assert set(table["reading"]) <= {"", "printed", "updated"}
+        assert set(table["method"]) <= {"", "adaboost", "unified", "unified-incorrect"}
+        assert set(table["reading"]) <= {"", "printed", "updated", "at-once"}
+        assert all({*name.split("+")} <= SHOWN for name in set(table["set"]) - {""})
 
 
 def test_positions_do_not_depend_on_addresses(pictures: dict[str, Picture]) -> None:

@@ -14,7 +14,7 @@ import pytest
 from replication import Demos
 from replication.envs.maze import as_maze
 from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import Key
+from replication.evidence.experiments import GENERAL, NONE, Key
 from replication.irl import Trial
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
@@ -26,14 +26,18 @@ from replication.trials.results import Results
 from replication.trials.run import run_trials
 from replication.trials.store import Store
 
+KEYS: tuple[Key, ...] = (
+    ("adaboost", "", NONE),
+    ("unified", "printed", NONE),
+    ("unified-incorrect", "at-once", GENERAL),
+)
 FRAME = re.compile(r'data:image/png;base64,([^"]*)')
 
 
 @pytest.fixture(scope="module")
 def trials(conditions: dict[Key, Condition], results: Results) -> dict[Key, Trial]:
-    """Return a trial of two methods that kept every iteration."""
-    keys = ("adaboost", ""), ("unified", "printed")
-    return {key: results.trial(conditions[key], 0, snapshots=True) for key in keys}
+    """Return a trial of each method that kept every iteration."""
+    return {key: results.trial(conditions[key], 0, snapshots=True) for key in KEYS}
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +59,11 @@ def frames(page: str) -> list[bytes]:
 
 def test_courses_are_the_trials(shown: list[Course], trials: dict[Key, Trial]) -> None:
     """Errors, ways and weights are those of the trial, with an entry for each iteration."""
-    labels = ["AdaBoost-IRL (R1)", "Unified, without incorrect, Fᵢ (printed)"]
+    labels = [
+        "AdaBoost-IRL (R1)",
+        "Unified, without incorrect, Fᵢ (printed)",
+        "Unified, with incorrect (general list), Fᵢ, maximum at once",
+    ]
     assert [one.label for one in shown] == labels
     for one, trial in zip(shown, trials.values(), strict=True):
         assert one.iterations == trial.iterations
@@ -80,7 +88,9 @@ def test_numbers_have_a_row_for_each_iteration(made: Player, shown: list[Course]
     table = made.numbers
     assert len(table) == sum(one.iterations + 1 for one in shown)
     last = table.groupby("method", sort=False).tail(1)
-    assert last["error"].tolist() == [0, 0]
+    keys = last[["method", "reading", "set"]].itertuples(index=False, name=None)
+    assert tuple(keys) == KEYS
+    assert last["error"].tolist() == [0, 0, 0]
     assert last["iteration"].tolist() == [one.iterations for one in shown]
 
 
@@ -121,7 +131,7 @@ def test_soccer_is_shown_on_the_field(soccer_demos: Demos, tmp_path: Path) -> No
     trial = run_trials([condition], trials=1, store=store, seed=3).trial(
         condition, 0, snapshots=True
     )
-    found = courses(soccer_demos, {("unified", "printed"): trial})
+    found = courses(soccer_demos, {("unified", "printed", NONE): trial})
     assert found[0].weights.shape == (4, 192)
     cells = trial.weights.reshape(192, -1)
     np.testing.assert_array_equal(np.abs(found[0].weights[-1]), np.abs(cells).max(axis=1))

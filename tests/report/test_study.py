@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from replication import Demos, save_demos
+from replication.evidence.experiments import GENERAL, NAMED, NONE, Key
 from replication.evidence.tables import sets_table
 from replication.paper.published import FIGURE_5, TABLE_1
 from replication.paper.register import ChoiceError
@@ -15,17 +17,22 @@ FEW = {"episodes": 60, "horizon": 40}
 
 def make(folder: Path, demos: str, experiment: str = "open-maze", **changed: object) -> Study:
     """Make a study of very few trials."""
-    report = {"trials": 3, "set_trials": 2, **changed}
-    place = {"store": str(folder / "trials.sqlite"), "out": str(folder / "out")}
-    return Study(experiment, demos, FEW, seed=4, jobs=1, **place, **report)  # type: ignore[arg-type]
+    given: dict[str, Any] = {"trials": 3, "sets": ("opposite", NAMED), "set_trials": 2, **changed}
+    place: dict[str, Any] = {"store": str(folder / "trials.sqlite"), "out": str(folder / "out")}
+    return Study(experiment, demos, FEW, seed=4, jobs=1, **place, **given)
 
 
 @pytest.fixture
-def study(small_demos: Demos, tmp_path: Path) -> Study:
-    """Make a study of a user's own maze."""
-    path = tmp_path / "small.json"
-    save_demos(small_demos, path)
-    return make(tmp_path, str(path))
+def own(small_demos: Demos, tmp_path: Path) -> str:
+    """Write a user's own maze."""
+    save_demos(small_demos, tmp_path / "small.json")
+    return str(tmp_path / "small.json")
+
+
+@pytest.fixture
+def study(own: str, tmp_path: Path) -> Study:
+    """Make a study of it."""
+    return make(tmp_path, own)
 
 
 def test_the_table_has_the_sets_beside_the_methods(study: Study) -> None:
@@ -33,10 +40,27 @@ def test_the_table_has_the_sets_beside_the_methods(study: Study) -> None:
     keys = ["method", "reading", "set"]
     assert not study.trials.duplicated([*keys, "trial"]).any()
     counts = study.trials.groupby(keys).size()
-    assert counts["unified-incorrect", "printed", "hit+detour"] == 3
-    assert counts["unified-incorrect", "printed", "opposite"] == 2
+    for reading in ("printed", "updated", "at-once"):
+        assert counts["unified-incorrect", reading, NAMED] == 3
+        assert counts["unified-incorrect", reading, GENERAL] == 3
+        assert counts["unified-incorrect", reading, "opposite"] == 2
     assert study.trials.head(len(study.main)).equals(study.main)
-    assert set(sets_table(study.trials, study.sets)["n"]) == {2}
+    saved = sets_table(study.trials, {**study.conditions, **study.sets})
+    assert dict(zip(saved["set"], saved["n"], strict=True)) == {"opposite": 2, NAMED: 3, GENERAL: 3}
+
+
+def test_methods_have_equally_many_trials_of_their_own(own: str, tmp_path: Path) -> None:
+    """Where sets have more trials than the methods, a set that is judged has no more of its own."""
+    study = make(tmp_path, own, trials=2, set_trials=3)
+    assert set(study.main.groupby(["method", "reading", "set"]).size()) == {2}
+    assert len(study.trials) == 9 * 2 + 6 * 1 + 3 * 3
+
+
+def test_without_sets_there_are_the_methods_alone(own: str, tmp_path: Path) -> None:
+    """Nothing else is run than what the paper is judged by."""
+    study = make(tmp_path, own, sets=(), set_trials=0)
+    assert study.sets == {}
+    assert study.trials.equals(study.main)
 
 
 def test_nothing_is_published_for_a_task_of_ones_own(study: Study, tmp_path: Path) -> None:
@@ -48,16 +72,37 @@ def test_nothing_is_published_for_a_task_of_ones_own(study: Study, tmp_path: Pat
     assert other.published_curves == {}
 
 
-def test_traced_trials_are_those_under_a_reading(study: Study) -> None:
-    """Each method has one trial under a reading of Eq. 9, with every iteration."""
-    traced = study.traced("updated")
-    assert list(traced) == [
-        ("adaboost", ""),
-        ("unified", "updated"),
-        ("unified-incorrect", "updated"),
-    ]
+@pytest.mark.parametrize(
+    ("reading", "set", "shown"),
+    [
+        ("updated", NAMED, [("unified", "updated", NONE), ("unified-incorrect", "updated", NAMED)]),
+        (
+            "at-once",
+            GENERAL,
+            [("unified", "printed", NONE), ("unified-incorrect", "at-once", GENERAL)],
+        ),
+        ("printed", NONE, [("unified", "printed", NONE)]),
+    ],
+)
+def test_traced_trials_are_those_of_a_cell(
+    study: Study, reading: str, set: str, shown: list[Key]
+) -> None:
+    """Each method has one trial, which counts under the reading and with the set; all is kept."""
+    traced = study.traced(reading, set)
+    assert list(traced) == [("adaboost", "", NONE), *shown]
     assert all(trial.snapshots is not None for trial in traced.values())
-    assert study.of("unified")["reading"].unique().tolist() == ["printed", "updated"]
+
+
+def test_rows_of_methods(study: Study) -> None:
+    """The rows of some methods have all of their readings and judged sets."""
+    rows = study.of("unified", "unified-incorrect")
+    assert rows.loc[rows["method"] == "unified", "reading"].unique().tolist() == [
+        "printed",
+        "updated",
+    ]
+    given = rows[rows["method"] == "unified-incorrect"]
+    assert given["reading"].unique().tolist() == ["printed", "updated", "at-once"]
+    assert given["set"].unique().tolist() == [NAMED, GENERAL]
 
 
 def test_a_report_is_checked(small_demos: Demos, tmp_path: Path) -> None:
