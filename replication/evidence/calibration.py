@@ -201,7 +201,7 @@ def finalists(table: pd.DataFrame) -> list[Point]:
     """Return the points that go on to the second stage, given the table of the first."""
     found: list[Point] = []
     for world in worlds(table).index[:WORLDS]:
-        own = table[(table[list(WORLD)] == world).all(axis=1)]
+        own = table[(table[list(WORLD)] == list(world)).all(axis=1)]
         for trace in TRACES:
             best = own[own["F-INDEX"] == trace].head(POINTS)
             found += [_point(row) for _, row in best.iterrows()]
@@ -213,7 +213,7 @@ def nearest(table: pd.DataFrame) -> dict[str, Point]:
     if not table["fits"].any():
         return {trace: (*PLAINEST, trace) for trace in TRACES}
     world = worlds(table).index[0]
-    own = table[(table[list(WORLD)] == world).all(axis=1)]
+    own = table[(table[list(WORLD)] == list(world)).all(axis=1)]
     return {trace: _point(own[own["F-INDEX"] == trace].iloc[0]) for trace in TRACES}
 
 
