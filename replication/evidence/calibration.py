@@ -4,7 +4,7 @@ Five choices that every run behind Table I must have made are not in the text. T
 the values under which the unified method without incorrect demonstrations comes nearest to its
 published mean and SD on the open maze. ``choices.toml`` states the rule. Three of the choices make
 the world in which all methods learn; alpha and F_0 belong to a trace, and each trace (F_i and
-F_(i+1), choice F-INDEX) gets its own.
+F_(i+1), choice F-INDEX) gets its own. One file because the rule can only be checked as a whole.
 """
 
 from __future__ import annotations
