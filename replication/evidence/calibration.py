@@ -4,7 +4,8 @@ Five choices that every run behind Table I must have made are not in the text. T
 the values under which the unified method without incorrect demonstrations comes nearest to its
 published mean and SD on the open maze. ``choices.toml`` states the rule. Three of the choices make
 the world in which all methods learn; alpha and F_0 belong to a trace, and each trace (F_i and
-F_(i+1), choice F-INDEX) would get its own. But no point fits, so all have the plainest one's.
+F_(i+1), choice F-INDEX) would get its own. But no point fits, so all have the plainest one's. One
+file because the rule can only be checked as a whole.
 """
 
 from __future__ import annotations
@@ -176,7 +177,7 @@ def finalists(table: pd.DataFrame) -> list[Point]:
     """Return the points that go on to the second stage, given the table of the first."""
     found: list[Point] = []
     for world in worlds(table).index[:WORLDS]:
-        own = table[(table[list(WORLD)] == world).all(axis=1)]
+        own = table[(table[list(WORLD)] == list(world)).all(axis=1)]
         for trace in TRACES:
             best = own[own["F-INDEX"] == trace].head(POINTS)
             found += [_point(row) for _, row in best.iterrows()]
@@ -188,7 +189,7 @@ def nearest(table: pd.DataFrame) -> dict[str, Point]:
     if not table["fits"].any():
         return {trace: (*PLAINEST, trace) for trace in TRACES}
     world = worlds(table).index[0]
-    own = table[(table[list(WORLD)] == world).all(axis=1)]
+    own = table[(table[list(WORLD)] == list(world)).all(axis=1)]
     return {trace: _point(own[own["F-INDEX"] == trace].iloc[0]) for trace in TRACES}
 
 

@@ -1,4 +1,7 @@
-"""Tables as a reader wants them: labels for keys, numbers with their intervals, Markdown."""
+"""Tables as a reader wants them: labels for keys, numbers with their intervals, Markdown.
+
+One file because all tables share their labels and the way in which numbers are written.
+"""
 
 from __future__ import annotations
 
