@@ -14,10 +14,18 @@ import pandas as pd
 
 from replication import files
 from replication.evidence.claims import LABELS, label, load_claims
+from replication.evidence.experiments import GENERAL
 from replication.evidence.tables import read_table
 from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, by_claim
 from replication.report.findings import at_once, chance, holding, shows_opposite
-from replication.report.readable import markdown, readable_verdicts, sentence
+from replication.report.readable import (
+    F_LABELS,
+    SET_LABELS,
+    markdown,
+    p_value,
+    readable_verdicts,
+    sentence,
+)
 
 TEMPLATE = "findings.md.jinja"
 
@@ -54,6 +62,9 @@ def numbers(figures: Path) -> dict[str, Any]:
     factorial = effects[effects["group"] == "factorial"]
     compared = judged[~judged["statistic"].str.startswith("published")]
     published = judged[judged["verdict"].isin([CONSISTENT, INCONSISTENT])]
+    in_general = compared["id"].isin(["SAVES-OPEN", "SAVES-OBSTACLES"]) & (
+        compared["set"] == GENERAL
+    )
     levels, pairs = read("sensitivity/levels"), read("sensitivity/numbers")
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
     opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
@@ -81,12 +92,16 @@ def numbers(figures: Path) -> dict[str, Any]:
         "every_pair": by_key(pairs[pairs["pairs"] == pairs["pairs"].max()], "reading"),
         "contrasts": by_key(read("open_maze/contrasts"), "x", "set", "reading"),
         "summary": by_key(read("open_maze/table1"), "method", "set", "reading"),
-        "check": by_key(read("calibration/check"), "trials", "reading"),
-        "finalists": read("calibration/final"),
+        "points": len(read("calibration/screen")),
+        "nearest": read("calibration/final").iloc[0].to_dict(),
         "rounding": by_key(
             read("rounding/rounding"), "task", "method", "reading", "tolerance", "arithmetic"
         ),
-        "profile": read("rounding/profile").groupby("reading")["rounded"].mean().to_dict(),
+        "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
+        "general_size": _consistency(compared[in_general]),
+        "set_labels": SET_LABELS,
+        "sentence_of": lambda id: sentence(judged[judged["id"] == id]),
+        "p": p_value,
         "depends": at_once(factorial),
         "chance": chance(factorial),
     }
@@ -94,6 +109,38 @@ def numbers(figures: Path) -> dict[str, Any]:
 
 HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
 """The claims of which the findings say in how many other sets of choices they hold."""
+
+
+def _consistency(rows: pd.DataFrame) -> str:
+    """Say in which cells an effect is consistent with the paper's, and else in which direction.
+
+    A ratio of SDs counts as larger the farther it is from 1.
+    """
+    parts = []
+    names = {
+        "yes": "consistent with it",
+        "larger": "larger than that",
+        "smaller": "smaller than that",
+    }
+    sizes = [_size(row) for row in rows.itertuples()]
+    for kind, text in names.items():
+        cells = [row for row, size in zip(rows.itertuples(), sizes, strict=True) if size == kind]
+        if cells:
+            where = " and ".join(
+                f"{F_LABELS[row.reading].split(' (')[0]}{PLACES.get(row.id, '')}" for row in cells
+            )
+            parts.append(f"{text} under {where}")
+    return ", ".join(parts)
+
+
+PLACES = {"SAVES-OPEN": " (open)", "SAVES-OBSTACLES": " (obstacles)"}
+
+
+def _size(row: Any) -> str:
+    if row.consistent != "no":
+        return str(row.consistent)
+    beyond = row.effect > row.predicted_high
+    return "larger" if beyond != (row.statistic == "sd-ratio") else "smaller"
 
 
 def by_key(table: pd.DataFrame, *keys: str) -> dict[str, Any]:
