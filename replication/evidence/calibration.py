@@ -4,7 +4,8 @@ Five choices that every run behind Table I must have made are not in the text. T
 the values under which the unified method without incorrect demonstrations comes nearest to its
 published mean and SD on the open maze. ``choices.toml`` states the rule. Three of the choices make
 the world in which all methods learn; alpha and F_0 belong to a trace, and each trace (F_i and
-F_(i+1), choice F-INDEX) gets its own.
+F_(i+1), choice F-INDEX) would get its own. But no point fits, so all have the plainest one's. One
+file because the rule can only be checked as a whole.
 """
 
 from __future__ import annotations
@@ -20,9 +21,8 @@ from replication.demos.files import load_demos
 from replication.demos.maze_expert import Expert, demonstrate
 from replication.demos.model import Demos
 from replication.envs.maze import as_maze
-from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, GENERAL, NAMED
+from replication.evidence.experiments import EXPERIMENTS
 from replication.evidence.statistics import (
-    mean_interval,
     mean_prediction,
     sd_interval,
     sd_prediction,
@@ -69,11 +69,7 @@ def points() -> list[Point]:
 
 def chosen(trace: str) -> Point:
     """Return the point of the register's defaults under a trace."""
-    values = [load_choices()[id].default for id in WORLD]
-    fields = {"ALPHA": "alpha", "F-START": "f_start"}
-    own = CALIBRATED.get(trace, {})
-    values += [own.get(fields[id], load_choices()[id].default) for id in TRACE]
-    return (*values, trace)
+    return (*(load_choices()[id].default for id in (*WORLD, *TRACE)), trace)
 
 
 @cache
@@ -82,13 +78,11 @@ def _demos(leg: int) -> Demos:
     return demonstrate("open-maze", as_maze(template.environment), params=Expert(leg=leg))
 
 
-def condition(point: Point, method: str = "unified", set: str = "none") -> Condition:
-    """Return the condition of a point."""
+def condition(point: Point) -> Condition:
+    """Return the condition of a point: the unified method without incorrect demonstrations."""
     leg, ties, q_start, alpha, f_start, trace = point
-    params = Params.of(
-        ties=ties, q_start=q_start, alpha=alpha, f_start=f_start, f_index=trace, incorrect=set
-    )
-    return Condition(_demos(int(leg)), method, params)
+    params = Params.of(ties=ties, q_start=q_start, alpha=alpha, f_start=f_start, f_index=trace)
+    return Condition(_demos(int(leg)), "unified", params)
 
 
 def kl_divergence(mean: float, sd: float, published: Published) -> float:
@@ -112,18 +106,8 @@ def kl_divergence(mean: float, sd: float, published: Published) -> float:
 
 # --- what is run ---------------------------------------------------------------------------------
 
-SETS = (NAMED, GENERAL)
-
-PARTS = ("screen", "final", "fits")
+PARTS = ("screen", "final")
 """The stages, as the column `part` of the table of trials names them."""
-
-
-def declared_condition(part: str, number: int) -> Condition:
-    """Return the condition of a row of the table of trials, by its stage and number."""
-    place, rest = divmod(number, len(SETS) if part == "fits" else 1)
-    if part == "fits":
-        return condition(points()[place], "unified-incorrect", SETS[rest])
-    return condition(points()[place])
 
 
 def stages(
@@ -131,28 +115,20 @@ def stages(
 ) -> list[tuple[int, Callable[[pd.DataFrame], list[Group]]]]:
     """Return the root seed of each stage, and what is run in it, given the trials before.
 
-    First all points, then the finalists, then what incorrect demonstrations save at each of the
-    finalists that fits.
+    First all points, then the finalists. A row's `number` is the point's place among all.
     """
 
-    def group(part: str, number: int, trials: int) -> Group:
-        labels = {"part": part, "number": number}
-        return Group([declared_condition(part, number)], trials, labels)
+    def group(part: str, point: Point, trials: int) -> Group:
+        return Group([condition(point)], trials, {"part": part, "number": points().index(point)})
 
     def screen(_: pd.DataFrame) -> list[Group]:
-        return [group("screen", number, screen_trials) for number in range(len(points()))]
+        return [group("screen", point, screen_trials) for point in points()]
 
     def final(trials: pd.DataFrame) -> list[Group]:
-        table = calibration_table(trials, "screen")
-        return [group("final", points().index(p), final_trials) for p in finalists(table)]
+        best = finalists(calibration_table(trials, "screen"))
+        return [group("final", point, final_trials) for point in best]
 
-    def fits(trials: pd.DataFrame) -> list[Group]:
-        table = calibration_table(trials, "final")
-        fitting = [points().index(_point(row)) for _, row in table[table["fits"]].iterrows()]
-        numbers = [len(SETS) * place + rest for place in fitting for rest in range(len(SETS))]
-        return [group("fits", number, final_trials) for number in numbers]
-
-    return [(SCREEN_SEED, screen), (FINAL_SEED, final), (FINAL_SEED, fits)]
+    return [(SCREEN_SEED, screen), (FINAL_SEED, final)]
 
 
 def calibration_table(trials: pd.DataFrame, stage: str) -> pd.DataFrame:
@@ -220,67 +196,6 @@ def nearest(table: pd.DataFrame) -> dict[str, Point]:
 def _point(row: pd.Series) -> Point:
     values = tuple(row[[*WORLD, *TRACE, "F-INDEX"]])
     return next(point for point in points() if point == values)
-
-
-def savings_table(trials: pd.DataFrame) -> pd.DataFrame:
-    """Return what each set of incorrect demonstrations saves at every finalist that fits."""
-    rows = []
-    final = trials[trials["part"] == "final"]
-    for number, own in trials[trials["part"] == "fits"].groupby("number"):
-        place, rest = divmod(int(number), len(SETS))
-        base = final[final["number"] == place].set_index("trial")["iterations"]
-        saved = (base - own.set_index("trial")["iterations"]).to_numpy(float)
-        low, high = mean_interval(saved)
-        rows.append(
-            {
-                **dict(zip((*WORLD, *TRACE, "F-INDEX"), points()[place], strict=True)),
-                "set": SETS[rest],
-                "n": len(saved),
-                "saved": saved.mean(),
-                "low": float(low),
-                "high": float(high),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def check_table(trials: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
-    """Return how near the chosen points come to the pair: in the calibration, and in the judging.
-
-    One row for each trace and source of trials: mean and SD with their intervals, and where both
-    would lie if the trials came from the published distribution.
-    """
-    rows = []
-    for trace in TRACES:
-        number = points().index(chosen(trace))
-        ours = trials[(trials["part"] == "final") & (trials["number"] == number)]
-        new = judged[(judged["method"] == "unified") & (judged["reading"] == trace)]
-        for source, own in (("calibration", ours), ("judging", new)):
-            if own.empty:
-                continue
-            counts = own["iterations"].to_numpy(float)
-            summary = summarise(counts, own["converged"])
-            sd_low, sd_high = sd_interval(counts)
-            mean_from, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, summary.n)
-            sd_from, sd_to = sd_prediction(PAIR.sd, PAIR.n, counts)
-            rows.append(
-                {
-                    "trials": source,
-                    "reading": trace,
-                    "n": summary.n,
-                    "mean": summary.mean,
-                    "low": summary.low,
-                    "high": summary.high,
-                    "predicted_low": mean_from,
-                    "predicted_high": mean_to,
-                    "sd": summary.sd,
-                    "sd_low": sd_low,
-                    "sd_high": sd_high,
-                    "sd_predicted_low": sd_from,
-                    "sd_predicted_high": sd_to,
-                }
-            )
-    return pd.DataFrame(rows)
 
 
 def rule_follows(table: pd.DataFrame) -> bool:

@@ -1,6 +1,7 @@
 """The paper's claims and the frozen criteria by which they are judged: the file ``claims.toml``.
 
-This module only reads and checks; :mod:`replication.evidence.verdicts` judges.
+This module only reads and checks; :mod:`replication.evidence.verdicts` judges. One file because
+what the paper says of a claim, its label and the place of its evidence are read together.
 """
 
 from __future__ import annotations

@@ -79,9 +79,6 @@ EXPERIMENTS = {
 }
 """By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension."""
 
-CALIBRATED: Mapping[str, Mapping[str, float]] = {"updated": {}}
-"""Choices under a reading of Eq. 9 that differ from the defaults (ALPHA and F-START)."""
-
 
 def conditions_of(
     demos: Demos,
@@ -145,7 +142,7 @@ def condition_of(task: str, method: str, reading: str, set: str) -> Condition:
 
 
 def _params(choices: Mapping[str, Any], reading: str, set: str) -> Params:
-    chosen = {"f_index": reading, **CALIBRATED.get(reading, {})} if reading else {}
+    chosen = {"f_index": reading} if reading else {}
     return Params.of(**{**chosen, **choices, "incorrect": set})
 
 

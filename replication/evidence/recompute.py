@@ -129,7 +129,7 @@ def declared_condition(row: Mapping[str, str]) -> Condition:
     if int(row["number"]) < 0:
         raise LookupError(f"there is no number {row['number']}")
     if row["part"] in calibration.PARTS:
-        conditions = [calibration.declared_condition(row["part"], int(row["number"]))]
+        conditions = [calibration.condition(calibration.points()[int(row["number"])])]
     elif row["part"] == rounding.PART:
         conditions = [list(rounding.conditions().values())[int(row["number"])]]
     else:

@@ -101,16 +101,18 @@ def rounding_table(trials: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         `difference` is the mean number of iterations more than in double precision over the same
         seeds, with its 95 % interval `low` to `high`; `p` that of a sign-flip test, and `p_holm`
-        adjusted over all rows of the tolerance; `equal` the share of trials with the same number.
+        adjusted over all rows of the tolerance; `equal` the share of trials with the same number;
+        `wrong` the mean number of wrong pairs that a wrong trajectory takes after the first one.
     """
-    rows = []
+    table_rows = []
     keys = list(conditions())
     for (setting, tolerance), own in _grouped(trials, keys).items():
         task, method, reading = setting
-        for arithmetic, counts in own.items():
-            d = counts - own["double"]
+        for arithmetic, rows in own.items():
+            counts = rows["iterations"].to_numpy(float)
+            d = counts - own["double"]["iterations"].to_numpy(float)
             low, high = mean_interval(d)
-            rows.append(
+            table_rows.append(
                 {
                     "task": task,
                     "method": method,
@@ -124,10 +126,11 @@ def rounding_table(trials: pd.DataFrame) -> pd.DataFrame:
                     "low": float(low),
                     "high": float(high),
                     "equal": float((d == 0).mean()),
+                    "wrong": rows["wrong_pairs"].sum() / (counts - 1).sum(),
                     "p": sign_flip_p(d) if arithmetic != "double" else float("nan"),
                 }
             )
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame(table_rows)
     table["p_holm"] = float("nan")
     for _, part in table[table["p"].notna()].groupby("tolerance"):
         table.loc[part.index, "p_holm"] = holm(part["p"].tolist())
@@ -143,13 +146,12 @@ def chosen_tolerance(table: pd.DataFrame) -> float | None:
 
 def _grouped(
     trials: pd.DataFrame, keys: Sequence[tuple[Setting, Value, Value]]
-) -> dict[tuple[Setting, Value], dict[Value, NDArray[np.float64]]]:
-    """Return the iterations, [trial], by setting and tolerance, and then by arithmetic."""
-    grouped: dict[tuple[Setting, Value], dict[Value, NDArray[np.float64]]] = {}
+) -> dict[tuple[Setting, Value], dict[Value, pd.DataFrame]]:
+    """Return the trials in their order, by setting and tolerance, and then by arithmetic."""
+    grouped: dict[tuple[Setting, Value], dict[Value, pd.DataFrame]] = {}
     for number, own in trials.groupby("number"):
         setting, tolerance, arithmetic = keys[int(number)]
-        counts = own.sort_values("trial")["iterations"].to_numpy(float)
-        grouped.setdefault((setting, tolerance), {})[arithmetic] = counts
+        grouped.setdefault((setting, tolerance), {})[arithmetic] = own.sort_values("trial")
     return grouped
 
 

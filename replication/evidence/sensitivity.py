@@ -35,6 +35,9 @@ HOLDS, OPEN, REVERSED = "holds", "open", "reversed"
 UNDEFINED = "undefined"
 """There is no effect: a ratio of SDs needs samples that vary."""
 
+LEVEL = 0.05
+"""Of the joint test, for a specification by itself."""
+
 NOISE, REST = "noise", "rest"
 """What the variance of an effect is due to beside single choices."""
 
@@ -171,7 +174,9 @@ def outcome_shares(effects: pd.DataFrame) -> pd.DataFrame:
     `share` is that of the specifications in which it holds, among those with an effect. In
     `with_caps` of them a trial ended at the iteration cap; of the `uncapped` others that have an
     effect, the claim holds in `holds_uncapped`. `unchanged` counts those with the numbers of the
-    default, whose choice cannot act on the claim or did not.
+    default, whose choice cannot act on the claim or did not. `p_median` and `p_holds` are those of
+    the joint test, and `alone` counts the specifications with an effect of either sign that it
+    shows by itself, allowing for all others.
     """
     rows = []
     for (claim, group), part in effects.groupby(["claim", "group"], sort=False):
@@ -191,6 +196,9 @@ def outcome_shares(effects: pd.DataFrame) -> pd.DataFrame:
                 "median": float(part["effect"].median()),
                 "lowest": float(part["effect"].min()),
                 "highest": float(part["effect"].max()),
+                "p_median": float(part["p_median"].iloc[0]),
+                "p_holds": float(part["p_holds"].iloc[0]),
+                "alone": int((part["p_family"] < LEVEL).sum()),
             }
         )
     return pd.DataFrame(rows)

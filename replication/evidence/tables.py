@@ -1,4 +1,7 @@
-"""From the table of trials to the tables of the paper, and tables as files: computing only."""
+"""From the table of trials to the tables of the paper, and tables as files: computing only.
+
+One file because all of them begin from the same table of trials.
+"""
 
 from __future__ import annotations
 

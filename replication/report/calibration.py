@@ -9,7 +9,7 @@ from replication.evidence.calibration import TRACE, WORLD
 from replication.irl.methods import TRACES
 from replication.report.drawing import handle
 from replication.report.picture import Picture
-from replication.report.readable import F_LABELS, SET_LABELS, Form, interval, readable
+from replication.report.readable import F_LABELS, Form, interval, readable
 from replication.report.style import canvas, legend_below, settled
 
 
@@ -45,13 +45,13 @@ def draw_points(numbers: pd.DataFrame) -> Figure:
         panel.plot(mean, sd, "*", ms=14, mfc="none", mec="#D0021B", mew=1.3, zorder=5)
         panel.set(title=F_LABELS[trace], xlabel="mean of the iterations")
     axes[0].set_ylabel("SD of the iterations")
-    handles = [
-        handle("fits, with 95 % intervals", "o", "#0072B2", lw=0.9),
-        handle("does not fit", "o", "0.55", mfc="white", lw=0.9),
-        handle(f"published ({mean:.2f}, {sd:.2f})", "*", "#D0021B", ms=10, mfc="none", lw=0),
-    ]
+    handles = [handle("does not fit, with 95 % intervals", "o", "0.55", mfc="white", lw=0.9)]
+    if numbers["fits"].any():
+        handles.append(handle("fits", "o", "#0072B2", lw=0.9))
     if numbers["default"].any():
-        handles.insert(2, handle("default", "o", "0.1", ms=9, mfc="none", lw=0))
+        handles.append(handle("default", "o", "0.1", ms=9, mfc="none", lw=0))
+    star = f"published ({mean:.2f}, {sd:.2f})"
+    handles.append(handle(star, "*", "#D0021B", ms=10, mfc="none", lw=0))
     legend_below(figure, handles)
     return figure
 
@@ -72,29 +72,3 @@ def readable_final(table: pd.DataFrame) -> pd.DataFrame:
         "Default": lambda row: "yes" if row.default else "",
     }
     return pd.concat([_point_columns(table), readable(table, forms)], axis=1)
-
-
-def readable_savings(table: pd.DataFrame) -> pd.DataFrame:
-    """Return what incorrect demonstrations save at the finalists that fit."""
-    if table.empty:
-        return pd.DataFrame({"Saved": ["no finalist fits"]})
-    forms: dict[str, Form] = {
-        "Incorrect": lambda row: SET_LABELS[row.set],
-        "Iterations saved [95 %]": lambda row: interval(row.saved, row.low, row.high),
-    }
-    return pd.concat([_point_columns(table), readable(table, forms)], axis=1)
-
-
-def readable_check(check: pd.DataFrame) -> pd.DataFrame:
-    """Return the check of the chosen points: means and SDs, and where they are expected."""
-    return readable(
-        check,
-        {
-            "Trials": lambda row: f"{row.n}, {row.trials}",
-            "Reading": lambda row: F_LABELS[row.reading],
-            "Mean [95 %]": lambda row: interval(row.mean, row.low, row.high),
-            "Expected": lambda row: f"{row.predicted_low:.2f} to {row.predicted_high:.2f}",
-            "SD [95 %]": lambda row: interval(row.sd, row.sd_low, row.sd_high),
-            "SD expected": lambda row: f"{row.sd_predicted_low:.2f} to {row.sd_predicted_high:.2f}",
-        },
-    )

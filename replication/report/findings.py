@@ -41,7 +41,7 @@ NAMES = {
     "F-START": "F₀",
     "Q-START": "whether Q is kept or reset in each iteration",
     "TIES": "how ties are broken",
-    "TIE-TOLERANCE": "the tolerance of ties",
+    "TIE-TOLERANCE": "which values count as tied",
     "W-START": "the first weights",
     "ADABOOST-RULE": "the rule of AdaBoost-IRL",
 }
@@ -109,42 +109,22 @@ def calibrated(screen: pd.DataFrame, final: pd.DataFrame) -> str:
 
     Both tables are those of :func:`replication.evidence.calibration.calibration_table`.
     """
-    fitting = final[final["fits"]]
-    texts = [
-        f"Of {len(screen)} points {len(final)} went on to the second stage; {len(fitting)} of them "
-        "fit, that is, mean and SD both lie where those of as many trials from the published "
-        "distribution would."
-    ]
-    follows = "They are our defaults" if rule_follows(final) else "They are NOT our defaults"
-    for trace, point in nearest(final).items():
-        row = final[(final[[*WORLD, *TRACE, "F-INDEX"]] == list(point)).all(axis=1)]
-        values = ", ".join(
-            f"{id} = {value}" for id, value in zip((*WORLD, *TRACE), point, strict=False)
-        )
-        text = f"Under {F_LABELS[trace]} the rule takes {values}"
-        for own in row.itertuples():
-            fits = "it fits" if own.fits else "it does not fit"
-            text += f", with a mean of {own.mean:.2f} (SD {own.sd:.2f}) in {own.n} trials: {fits}"
-        texts.append(f"{text}.")
-    return " ".join([*texts, f"{follows}."])
-
-
-def rechecked(check: pd.DataFrame) -> str:
-    """Return in words whether the chosen points stay as near in the trials of the judging run.
-
-    `check` is that of :func:`replication.evidence.calibration.check_table`.
-    """
+    best = final.iloc[0]
+    fits = int(final["fits"].sum())
     texts = []
-    for row in check[check["trials"] == "judging"].itertuples():
-        mean = row.predicted_low <= row.mean <= row.predicted_high
-        sd = row.sd_predicted_low <= row.sd <= row.sd_predicted_high
-        words = {True: "is", False: "is not"}
-        where = f"the mean {words[mean]} where the published distribution predicts it, the SD "
-        texts.append(
-            f"Under {F_LABELS[row.reading]} the judging run has a mean of {row.mean:.2f} "
-            f"(SD {row.sd:.2f}) in {row.n} trials: {where}{words[sd]}."
-        )
-    return " ".join(texts)
+    for trace, point in nearest(final).items():
+        pairs = zip((*WORLD, *TRACE), point, strict=False)
+        values = ", ".join(f"{id} = {value}" for id, value in pairs)
+        texts.append(f"under {F_LABELS[trace]}: {values}")
+    values = "; ".join(texts)
+    follows = "These are" if rule_follows(final) else "These are NOT"
+    return (
+        f"Of {len(screen)} points {len(final)} went on to the second stage, and **{fits or 'none'} "
+        f"of them** {'fits' if fits < 2 else 'fit'} the pair. The nearest has a mean of "
+        f"{best['mean']:.2f} (SD {best['sd']:.2f}) in {best['n']} trials; the paper has "
+        f"{best['paper_mean']:.2f} ({best['paper_sd']:.2f}). The rule takes {values}. {follows} "
+        "our defaults."
+    )
 
 
 # --- below the specifications --------------------------------------------------------------------

@@ -1,4 +1,7 @@
-"""Tables as a reader wants them: labels for keys, numbers with their intervals, Markdown."""
+"""Tables as a reader wants them: labels for keys, numbers with their intervals, Markdown.
+
+One file because all tables share their labels and the way in which numbers are written.
+"""
 
 from __future__ import annotations
 
@@ -262,6 +265,10 @@ def readable_outcomes(table: pd.DataFrame) -> pd.DataFrame:
             "With capped trials": lambda row: row.with_caps,
             "Holds in the others": lambda row: f"{row.holds_uncapped} of {row.uncapped}",
             "As the default": lambda row: row.unchanged,
+            "Shown by itself": lambda row: "–" if np.isnan(row.p_holds) else row.alone,
+            "Joint p: median, number": lambda row: (
+                f"{p_value(row.p_median)}, {p_value(row.p_holds)}"
+            ),
             "Effect: median (least, largest)": lambda row: (
                 f"{row.median:.2f} ({row.lowest:.2f}, {row.highest:.2f})"
             ),

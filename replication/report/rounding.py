@@ -134,5 +134,6 @@ def readable_rounding(table: pd.DataFrame) -> pd.DataFrame:
             "More than double [95 %]": lambda row: interval(row.difference, row.low, row.high),
             "Equal trials": lambda row: f"{row.equal:.0%}",
             "p, Holm": lambda row: p_value(row.p_holm),
+            "Wrong pairs": lambda row: f"{row.wrong:.1f}",
         },
     )

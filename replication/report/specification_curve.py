@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from replication.evidence.claims import short_label
-from replication.evidence.sensitivity import HOLDS, UNDEFINED
+from replication.evidence.sensitivity import HOLDS, LEVEL, UNDEFINED
 from replication.evidence.specifications import DEFAULT, default_of, named_choices, sort_key
 from replication.report import drawing
 from replication.report.drawing import OUTCOMES, SMALL, handle
@@ -152,7 +152,7 @@ def _jointly(part: pd.DataFrame) -> str:
     first = part.iloc[0]
     if np.isnan(first["p_median"]):
         return ""
-    alone = int((part["p_family"] < 0.05).sum())
+    alone = int((part["p_family"] < LEVEL).sum())
     return (
         f"\njointly: median {p_is(first['p_median'])}, number {p_is(first['p_holds'])}"
         f"\n{alone} beyond chance by themselves (family-wise)"

@@ -121,6 +121,9 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     for pattern in PLACES:
         for path in sorted(files.PROJECT.glob(pattern)):
             yield path.relative_to(files.PROJECT).as_posix(), read_file(path)
+    docs = files.PROJECT / "docs"
+    for path in sorted(docs.glob("round_1/*")):
+        yield path.relative_to(docs).as_posix(), read_file(path)
     for path in sorted(out.glob("[!.]*/[!.]*")):
         if path.suffix != ".ipynb":
             yield f"figures/{path.relative_to(out).as_posix()}", read_file(path)

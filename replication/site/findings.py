@@ -13,25 +13,21 @@ import jinja2
 import pandas as pd
 
 from replication import files
-from replication.evidence.calibration import grid
-from replication.evidence.claims import load_claims
-from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.claims import LABELS, label, load_claims
+from replication.evidence.experiments import GENERAL
 from replication.evidence.tables import read_table
-from replication.evidence.verdicts import (
-    NOT_TESTABLE,
-    REPRODUCED,
-    by_claim,
-    judged_trials,
-    overall,
-    read_trials,
+from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, by_claim
+from replication.report.findings import at_once, chance, holding, shows_opposite
+from replication.report.readable import (
+    F_LABELS,
+    SET_LABELS,
+    markdown,
+    p_value,
+    readable_verdicts,
+    sentence,
 )
-from replication.report.findings import at_once, chance, holding
-from replication.report.readable import markdown, readable_verdicts
 
 TEMPLATE = "findings.md.jinja"
-
-OPPOSITE = ("opposite", "hit+detour+opposite", "all")
-"""The values of INCORRECT-KINDS that include the opposite direction."""
 
 
 def render_findings(figures: Path) -> tuple[str, str]:
@@ -49,7 +45,6 @@ def render_findings(figures: Path) -> tuple[str, str]:
         "fixed": fixed,
         "percent": "{:.0%}".format,
         "interval": interval,
-        "saving": saving,
     }
     template = environment.get_template(TEMPLATE)
     context = numbers(figures)
@@ -65,66 +60,87 @@ def numbers(figures: Path) -> dict[str, Any]:
 
     judged, effects = read("claims/verdicts"), read("sensitivity/effects")
     factorial = effects[effects["group"] == "factorial"]
-    outcomes, levels = read("sensitivity/outcomes"), read("sensitivity/levels")
-    pairs = read("sensitivity/numbers")
-    trials = judged_trials(read_trials(figures), load_claims().judging)
-    compared = judged[judged["direction"] != "inside"]
-    holds = [holding(effects, id) for id, _ in by_claim(compared)]
-    verdict = {id: overall(rows["verdict"].tolist()) for id, rows in by_claim(judged)}
-    published = [verdict[claim.id] for claim in load_claims().claim if claim.direction == "inside"]
+    compared = judged[~judged["statistic"].str.startswith("published")]
+    published = judged[judged["verdict"].isin([CONSISTENT, INCONSISTENT])]
+    in_general = compared["id"].isin(["SAVES-OPEN", "SAVES-OBSTACLES"]) & (
+        compared["set"] == GENERAL
+    )
+    levels, pairs = read("sensitivity/levels"), read("sensitivity/numbers")
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
-    opposite = kinds["value"].isin(OPPOSITE)
-    check = read("calibration/check").to_dict("records")
+    opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
     return {
         "judging": load_claims().judging,
-        "verdict": verdict,
-        "verdicts": markdown(
-            readable_verdicts(compared).assign(**{"Holds with other choices": holds})
-        ),
-        "tested": len(published) - published.count(NOT_TESTABLE),
-        "reproduced": published.count(REPRODUCED),
-        "claim": by_key(judged, "id", "reading"),
-        "outcomes": by_key(outcomes[outcomes["group"] == "factorial"], "claim"),
+        "sentence": {id: sentence(rows) for id, rows in by_claim(judged)},
+        "verdicts": markdown(readable_verdicts(compared)),
+        "holds": [
+            (label(id), holding(effects, id)) for id in compared["id"].unique() if id in HOLDING
+        ],
+        "cell": by_key(judged, "id", "set", "reading"),
+        "published": len(published),
+        "consistent": int((published["verdict"] == CONSISTENT).sum()),
+        "joint": by_key(factorial.drop_duplicates("claim"), "claim"),
+        "outcomes": by_key(read("sensitivity/outcomes"), "group", "claim"),
         "levels": by_key(levels, "claim", "choice", "value"),
         "variance": by_key(read("sensitivity/shares"), "claim", "choice"),
         "kinds": {
             "opposite": kinds.loc[opposite, "holds"].tolist(),
             "other": kinds.loc[~opposite, "holds"].tolist(),
         },
+        "taken": by_key(read("open_maze/kinds"), "reading", "kind"),
+        "sets": by_key(read("open_maze/sets"), "set", "reading"),
         "ablations": by_key(read("sensitivity/ablations"), "method", "reading", "choices"),
         "every_pair": by_key(pairs[pairs["pairs"] == pairs["pairs"].max()], "reading"),
-        "sets": {
-            place: by_key(read(f"{place}_maze/sets"), "set", "reading")
-            for place in ("open", "obstacle")
-        },
-        "equal": {task: _equal_errors(trials[trials["task"] == task]) for task in EXPERIMENTS},
-        "few": _share_below(trials, judged),
-        "reward_sd": _reward_sd(trials),
-        "points": len(grid()),
-        **dict(zip(("grid", "new", "other"), check, strict=True)),
+        "contrasts": by_key(read("open_maze/contrasts"), "x", "set", "reading"),
+        "summary": by_key(read("open_maze/table1"), "method", "set", "reading"),
+        "points": len(read("calibration/screen")),
+        "nearest": read("calibration/final").iloc[0].to_dict(),
+        "rounding": by_key(
+            read("rounding/rounding"), "task", "method", "reading", "tolerance", "arithmetic"
+        ),
+        "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
+        "general_size": _consistency(compared[in_general]),
+        "set_labels": SET_LABELS,
+        "sentence_of": lambda id: sentence(judged[judged["id"] == id]),
+        "p": p_value,
         "depends": at_once(factorial),
         "chance": chance(factorial),
     }
 
 
-def _equal_errors(trials: pd.DataFrame) -> dict[str, int]:
-    """Return by reading how many trials have as many early errors with incorrect demonstrations."""
-    errors = trials.pivot(index="trial", columns=["method", "reading"], values="early_errors")
-    same = errors["unified"] == errors["unified-incorrect"]
-    return {**same.sum().to_dict(), "trials": len(same)}
+HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
+"""The claims of which the findings say in how many other sets of choices they hold."""
 
 
-def _share_below(trials: pd.DataFrame, judged: pd.DataFrame) -> dict[Any, float]:
-    """Return by reading in which share of soccer trials no more are needed than in the paper's."""
-    paper = judged.loc[judged["id"] == "RUN-INCORRECT-SOCCER", "paper"].iloc[0]
-    rows = trials[(trials["task"] == "soccer") & (trials["method"] == "unified-incorrect")]
-    return (rows["iterations"] <= paper).groupby(rows["reading"]).mean().to_dict()
+def _consistency(rows: pd.DataFrame) -> str:
+    """Say in which cells an effect is consistent with the paper's, and else in which direction.
+
+    A ratio of SDs counts as larger the farther it is from 1.
+    """
+    parts = []
+    names = {
+        "yes": "consistent with it",
+        "larger": "larger than that",
+        "smaller": "smaller than that",
+    }
+    sizes = [_size(row) for row in rows.itertuples()]
+    for kind, text in names.items():
+        cells = [row for row, size in zip(rows.itertuples(), sizes, strict=True) if size == kind]
+        if cells:
+            where = " and ".join(
+                f"{F_LABELS[row.reading].split(' (')[0]}{PLACES.get(row.id, '')}" for row in cells
+            )
+            parts.append(f"{text} under {where}")
+    return ", ".join(parts)
 
 
-def _reward_sd(trials: pd.DataFrame) -> float:
-    """Return the SD between trials of the reward's slope, in the open maze as printed."""
-    rows = trials[(trials["task"] == "open-maze") & (trials["method"] == "unified")]
-    return float(rows.loc[rows["reading"] == "printed", "reward_slope"].std())
+PLACES = {"SAVES-OPEN": " (open)", "SAVES-OBSTACLES": " (obstacles)"}
+
+
+def _size(row: Any) -> str:
+    if row.consistent != "no":
+        return str(row.consistent)
+    beyond = row.effect > row.predicted_high
+    return "larger" if beyond != (row.statistic == "sd-ratio") else "smaller"
 
 
 def by_key(table: pd.DataFrame, *keys: str) -> dict[str, Any]:
@@ -169,15 +185,3 @@ def interval(row: Mapping[str, Any], name: str = "effect", digits: int = 1) -> s
     bounds = (row.get(f"{name}_{end}", row.get(end)) for end in ("low", "high"))
     value, low, high = (fixed(number, digits) for number in (row[name], *bounds))
     return f"{value} [{low}, {high}]"
-
-
-def saving(row: Mapping[str, Any], name: str = "effect") -> str:
-    """Return how many iterations a row saves: its difference with the sign changed.
-
-    Examples
-    --------
-    >>> saving({"effect": -2.0, "low": -3.0, "high": 0.0})
-    '2.0 [0.0, 3.0]'
-    """
-    turned = {name: -row[name], "low": -row["high"], "high": -row["low"]}
-    return interval(turned, name)

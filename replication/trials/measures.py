@@ -136,6 +136,7 @@ def measure(
     early = early_iterations(demos, report)
     middle = round(report.mid_term * trial.iterations)
     wrong = marked_pairs(demos)
+    right = visited(demos.correct, shape=wrong.shape)
     loops = trial.episodes[1:]  # the first one is a random walk
     return {
         "iterations": trial.iterations,
@@ -144,6 +145,7 @@ def measure(
         "early_errors": sum(_errors(episode, wrong) for episode in loops[:early]),
         "q_growth": _growth(trial.values, middle),
         "reward_growth": _growth(trial.rewards, middle),
+        "wrong_pairs": sum(_taken(episode, ~right) for episode in loops),
         "acted": sum(_taken(episode, shown) for episode in loops),
         "acted_at_first": _taken(trial.episodes[0], shown),
         **{

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from replication import Demos
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import NAMED, Key, conditions_of
 from replication.evidence.specifications import Specification
 from replication.trials.condition import Condition
 from replication.trials.measures import measure_trials
@@ -14,7 +14,7 @@ from replication.trials.store import Store
 
 FEW = {"episodes": 100, "horizon": 40}
 
-Run = tuple[Results, dict[Specification, dict[tuple[str, str], Condition]]]
+Run = tuple[Results, dict[Specification, dict[Key, Condition]]]
 
 
 def table_of(run: Run) -> pd.DataFrame:
@@ -32,12 +32,16 @@ def table_of(run: Run) -> pd.DataFrame:
 @pytest.fixture(scope="session")
 def tiny(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Run two specifications, the second with a cap that most trials reach, and one method less."""
-    usual = method_conditions(small_demos, FEW)
-    capped = method_conditions(small_demos, {**FEW, "max_iterations": 5})
+    usual = conditions_of(small_demos, FEW, sets=[NAMED])
+    capped = conditions_of(small_demos, {**FEW, "max_iterations": 5}, sets=[NAMED])
     conditions = {
-        Specification("single", ()): {k: one for k, one in usual.items() if k[1] != "updated"},
+        Specification("single", ()): {
+            key: one for key, one in usual.items() if one.rule.under("printed") == key[1]
+        },
         Specification("single", (("ITERATION-CAP", 5),)): {
-            k: one for k, one in capped.items() if k[1] != "printed" and k[0] != "adaboost"
+            key: one
+            for key, one in capped.items()
+            if one.rule.under("updated") == key[1] and one.method != "adaboost"
         },
     }
     store = Store(tmp_path_factory.mktemp("sensitivity") / "trials.sqlite")

@@ -7,60 +7,120 @@ import pytest
 
 from replication import Demos
 from replication.errors import UserError
+from replication.evidence import experiments
 from replication.evidence.experiments import (
+    CALIBRATED,
     EXPERIMENTS,
+    GENERAL,
+    NAMED,
+    NONE,
     SETS,
     condition_of,
+    conditions_of,
     main_trials,
-    method_conditions,
     rule_conditions,
-    set_conditions,
     under,
 )
-from replication.irl import READINGS
-from replication.paper.register import ChoiceError
+from replication.irl import METHODS, READINGS
+from replication.paper.register import ChoiceError, load_choices
 from replication.trials.compute import trial_key
 from replication.trials.measures import factors
 
+BOTH = ("printed", "updated")
 
-def test_both_readings_stand_side_by_side(small_demos: Demos) -> None:
-    """Every method with a trace is there under F_i and F_(i+1), AdaBoost-IRL once."""
-    keys = set(method_conditions(small_demos, {}))
-    assert keys == {("adaboost", "")} | {
-        (method, f) for method in ("unified", "unified-incorrect") for f in READINGS
+
+def test_every_reading_and_set_stands_side_by_side(small_demos: Demos) -> None:
+    """AdaBoost-IRL once, the method without incorrect ones under both traces, with them in all."""
+    keys = list(conditions_of(small_demos, {}))
+    assert keys == [
+        ("adaboost", "", NONE),
+        *(("unified", f, NONE) for f in BOTH),
+        *(("unified-incorrect", f, set) for set in (NAMED, GENERAL) for f in READINGS),
+    ]
+
+
+def test_key_says_what_a_condition_is(small_demos: Demos) -> None:
+    """The key has the method, reading and set that the condition runs with and is given."""
+    for (method, reading, set), condition in conditions_of(small_demos, {}, sets=SETS).items():
+        assert condition.method == method
+        assert condition.params.update.f_index == (reading or "printed")
+        shown = {demo.kind for demo in condition.selected.incorrect}
+        assert shown == ({*set.split("+")} if set != NONE else {*()})
+        own = {"task": "small", "method": method, "reading": reading, "set": set}
+        assert factors(condition) == own
+
+
+def test_named_kinds_and_general_list_are_those_of_the_paper() -> None:
+    """IV-A names hits and detours; III-B's list adds the opposite direction; soccer has all."""
+    assert load_choices()["INCORRECT-KINDS"].default == NAMED == "hit+detour"
+    assert GENERAL == "hit+detour+opposite"
+    assert {task: one.sets for task, one in EXPERIMENTS.items()} == {
+        "open-maze": (NAMED, GENERAL),
+        "obstacle-maze": (NAMED, GENERAL),
+        "soccer": ("all",),
     }
+    assert {NONE, NAMED, GENERAL} < {*SETS}
+
+
+def test_cells_of_each_experiment() -> None:
+    """In the mazes nine conditions; in soccer, without AdaBoost-IRL and with one set, five."""
+    sizes = {task: len(one.conditions()) for task, one in EXPERIMENTS.items()}
+    assert sizes == {"open-maze": 9, "obstacle-maze": 9, "soccer": 5}
+    for task, one in EXPERIMENTS.items():
+        for (_, _, set), condition in one.conditions().items():
+            assert condition.demos.task == task
+            assert set in (NONE, *one.sets)
 
 
 def test_choices_reach_every_setting(small_demos: Demos) -> None:
-    """A notebook's choices apply to all methods; the reading of Eq. 9 is not one of them."""
-    conditions = method_conditions(small_demos, {"alpha": 0.1})
+    """A notebook's choices apply to all conditions; reading and set are none of them."""
+    conditions = conditions_of(small_demos, {"alpha": 0.1})
     assert {condition.params.update.alpha for condition in conditions.values()} == {0.1}
-    with pytest.raises(ChoiceError, match="f_index"):
-        method_conditions(small_demos, {"f_index": "updated"})
+    for name, value in (("f_index", "updated"), ("incorrect", "hit")):
+        with pytest.raises(ChoiceError, match=f"choices: {name} is run in every way"):
+            conditions_of(small_demos, {name: value})
+
+
+def test_calibrated_choices_are_those_of_their_reading(
+    small_demos: Demos, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ALPHA and F-START belong to a trace: F_(i+1) has its own unless told otherwise."""
+    assert CALIBRATED.keys() <= {"updated"}  # the defaults are those of F_i, and so of at-once
+    assert {name for own in CALIBRATED.values() for name in own} <= {"alpha", "f_start"}
+    monkeypatch.setattr(experiments, "CALIBRATED", {"updated": {"alpha": 0.9}})
+    usual = load_choices()["ALPHA"].default
+    for (_, reading, _), condition in conditions_of(small_demos, {}).items():
+        expected = 0.9 if reading == "updated" else usual
+        assert condition.params.update.alpha == expected
+    for condition in conditions_of(small_demos, {"alpha": 0.1}).values():
+        assert condition.params.update.alpha == 0.1
+    assert condition_of("open-maze", "unified", "updated", NONE).params.update.alpha == 0.9
 
 
 def test_sets_without_their_kinds_are_left_out(small_demos: Demos) -> None:
-    """A user's file with fewer kinds gets the sets that it can form, the empty one always."""
-    names = {kinds for kinds, _ in set_conditions(small_demos.select("hit"), {})}
-    assert names == {"none", "hit"}
-    assert {kinds for kinds, _ in set_conditions(small_demos, {})} == set(SETS)
+    """A user's file with fewer kinds gets the sets that it can form, or else all of them as one."""
+
+    def sets(demos: Demos, among: tuple[str, ...] = (NAMED, GENERAL)) -> list[str]:
+        found = conditions_of(demos, {}, ["unified", "unified-incorrect"], among)
+        assert {key for key in found if key[0] == "unified"} == {("unified", f, NONE) for f in BOTH}
+        return list(dict.fromkeys(set for method, _, set in found if method != "unified"))
+
+    assert sets(small_demos) == [NAMED, GENERAL]
+    assert sets(small_demos, SETS) == [set for set in SETS if set != NONE]
+    assert sets(small_demos, ("all", NONE)) == ["all"]
+    assert sets(small_demos.select("hit+detour")) == [NAMED]
+    assert sets(small_demos.select("hit")) == ["all"]
+    assert sets(small_demos.select("hit"), SETS) == ["hit"]
     own = replace(small_demos, incorrect=(replace(small_demos.incorrect[0], kind="late"),))
-    assert {kinds for kinds, _ in set_conditions(own, {})} == {"none", "all"}
-    assert {kinds for kinds, _ in set_conditions(small_demos.select("none"), {})} == {"none"}
-
-
-def test_default_set_shares_its_trials_with_the_table(small_demos: Demos) -> None:
-    """The default set and the empty set are the table's own conditions, not computed twice."""
-    conditions, sets = method_conditions(small_demos, {}), set_conditions(small_demos, {})
-    for f in READINGS:
-        assert sets["hit+detour", f] == conditions["unified-incorrect", f]
-        assert sets["none", f] == conditions["unified", f]
+    assert sets(own) == ["all"]
+    assert sets(small_demos.select("none")) == []
 
 
 def test_every_reading_of_adaboost_is_a_setting(small_demos: Demos) -> None:
     """The registered readings are all there, the default among them, and differ only in that."""
     rules = rule_conditions(small_demos, {"alpha": 0.1})
-    assert rules["mismatch"] == method_conditions(small_demos, {"alpha": 0.1})["adaboost", ""]
+    own = conditions_of(small_demos, {"alpha": 0.1})["adaboost", "", NONE]
+    assert trial_key(rules["mismatch"], 1, 2) == trial_key(own, 1, 2)
     assert {name: condition.params.update.adaboost_rule for name, condition in rules.items()} == {
         name: name for name in rules
     }
@@ -70,12 +130,12 @@ def test_every_reading_of_adaboost_is_a_setting(small_demos: Demos) -> None:
 @pytest.mark.parametrize("task", list(EXPERIMENTS))
 def test_a_condition_is_rebuilt_from_its_row(task: str) -> None:
     """What a published row says of its condition is enough to compute the same trial again."""
-    conditions = list(EXPERIMENTS[task].conditions().values())
+    conditions = EXPERIMENTS[task].conditions()
     if task != "soccer":
-        demos, choices = conditions[0].demos, EXPERIMENTS[task].choices
-        conditions += set_conditions(demos, choices).values()
-    for condition in conditions:
-        again = condition_of(**factors(condition))
+        demos = next(iter(conditions.values())).demos
+        conditions |= conditions_of(demos, EXPERIMENTS[task].choices, METHODS, SETS)
+    for key, condition in conditions.items():
+        again = condition_of(task, *key)
         assert trial_key(again, 1, 2) == trial_key(condition, 1, 2)
         assert factors(again) == factors(condition)
 
@@ -88,6 +148,8 @@ def test_a_condition_is_rebuilt_from_its_row(task: str) -> None:
         ("open-maze", "unified", "", "none"),
         ("open-maze", "unified", "both", "none"),
         ("open-maze", "unified", "printed", "hit"),
+        ("open-maze", "unified", "at-once", "none"),
+        ("open-maze", "adaboost", "printed", "none"),
         ("open-maze", "unified-incorrect", "printed", "hits"),
         ("soccer", "adaboost", "printed", "none"),
     ],
@@ -99,19 +161,29 @@ def test_rows_of_no_condition_are_refused(row: tuple[str, str, str, str]) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_main_trials_are_those_of_the_default_sets() -> None:
-    """The rows of other sets are left out, each task by its own default."""
+def test_main_trials_are_those_of_the_judged_sets() -> None:
+    """The rows of other sets are left out, each task by its own."""
     trials = pd.DataFrame(
         {
-            "task": ["open-maze"] * 3 + ["soccer"] * 2,
-            "set": ["none", "hit+detour", "hit", "none", "all"],
+            "task": ["open-maze"] * 5 + ["soccer"] * 3 + ["elsewhere"],
+            "set": ["none", NAMED, "hit", GENERAL, "all", "none", "all", NAMED, "none"],
         }
     )
-    assert main_trials(trials).index.tolist() == [0, 1, 3, 4]
+    assert main_trials(trials).index.tolist() == [0, 1, 3, 5, 6]
 
 
-def test_a_method_without_a_trace_counts_under_both_readings() -> None:
-    """Rows are taken by their reading; an empty one fits each."""
-    rows = pd.DataFrame({"reading": ["", "printed", "updated"]})
-    assert under(rows, "printed").index.tolist() == [0, 1]
-    assert under(rows, "updated").index.tolist() == [0, 2]
+def test_each_method_counts_once_under_a_reading() -> None:
+    """AdaBoost-IRL beside each; without incorrect ones the printed trials beside at-once."""
+    rows = pd.DataFrame(
+        [(method.name, f) for method in METHODS.values() for f in method.readings],
+        columns=["method", "reading"],
+    )
+    expected = {
+        "printed": [("adaboost", ""), ("unified", "printed"), ("unified-incorrect", "printed")],
+        "updated": [("adaboost", ""), ("unified", "updated"), ("unified-incorrect", "updated")],
+        "at-once": [("adaboost", ""), ("unified", "printed"), ("unified-incorrect", "at-once")],
+    }
+    for reading, pairs in expected.items():
+        found = under(rows, reading)
+        assert list(zip(found["method"], found["reading"], strict=True)) == pairs
+    assert under(rows.iloc[:0], "printed").empty

@@ -23,11 +23,11 @@ def correlated(rng: np.random.Generator, specifications: int, trials: int) -> Ar
 
 def test_by_hand() -> None:
     """Two specifications of two trials: 2^2 patterns, of which all numbers are written down."""
-    found = joint_test(np.array([[-1.0, -3.0], [-1.0, -1.0]]))
-    # Means by pattern (as they are, first, second, both flipped): -2, -1, 1, 2 and -1, 0, 0, 1.
-    # Their medians: -1.5, -.5, .5, 1.5.
-    assert (found.median, found.p_median) == (-1.5, 2 / 4)
-    # t of the first is -2, of the second minus infinity, as is that of the pattern itself only.
+    found = joint_test(np.array([[1.0, 3.0], [1.0, 1.0]]))
+    # Means by pattern (as they are, first, second, both flipped): 2, 1, -1, -2 and 1, 0, 0, -1.
+    # Their medians: 1.5, .5, -.5, -1.5.
+    assert (found.median, found.p_median) == (1.5, 2 / 4)
+    # t of the first is 2, of the second infinity, as is that of the pattern itself only.
     assert (found.significant, found.p_significant) == (1, 1 / 4)
     # |mean| over root mean square: 2, 1, 1, 2 over sqrt(5) and 1, 0, 0, 1.
     assert found.p_familywise.tolist() == [2 / 4, 2 / 4]
@@ -49,10 +49,10 @@ def slow_familywise(differences: Array) -> list[float]:
 
 def test_familywise_by_definition() -> None:
     """The adjusted p-values are those of the largest |t| of SciPy, pattern by pattern."""
-    differences = correlated(np.random.default_rng(1), 4, 7) - np.array([[0.0], [1], [5], [9]])
+    differences = correlated(np.random.default_rng(1), 4, 7) - np.array([[0.0], [-1], [-5], [-9]])
     found = joint_test(differences)
     assert found.p_familywise == pytest.approx(slow_familywise(differences))
-    t = stats.ttest_1samp(differences, 0.0, axis=1, alternative="less")
+    t = stats.ttest_1samp(differences, 0.0, axis=1, alternative="greater")
     assert found.significant == (t.pvalue < 0.025).sum()
     assert found.median == pytest.approx(np.median(differences.mean(axis=1)))
 
@@ -60,11 +60,11 @@ def test_familywise_by_definition() -> None:
 @pytest.mark.parametrize("n", [8, 40])
 def test_one_specification_is_a_sign_flip_test(n: int) -> None:
     """Alone, a specification has the p-value of its own test, and its null lies about zero."""
-    d = np.random.default_rng(2).normal(-0.5, 1, n)
+    d = np.random.default_rng(2).normal(0.5, 1, n)
     found = joint_test(d[None])
     assert found.p_median == pytest.approx(sign_flip_p(d), abs=0.01)
     assert found.p_familywise == pytest.approx([found.p_median])
-    assert found.significant == (mean_interval(d)[1] < 0)
+    assert found.significant == (mean_interval(d)[0] > 0)
     half = 1.96 * ((d**2).mean() / n) ** 0.5
     assert [found.null_low[0], found.null_high[0]] == pytest.approx([-half, half], rel=0.15)
 
@@ -96,21 +96,21 @@ def test_levels() -> None:
 
 
 def test_an_effect_is_found_on_the_claimed_side_only() -> None:
-    """Negative differences are significant together; positive ones are, two-sided, the reverse."""
+    """Positive differences are significant together; negative ones are, two-sided, the reverse."""
     differences = correlated(np.random.default_rng(5), 20, 60) / 20
-    fewer, more = joint_test(differences - 2), joint_test(differences + 2)
-    assert (fewer.significant, more.significant) == (20, 0)
-    assert max(fewer.p_median, fewer.p_significant, more.p_median) < 0.01
-    assert more.p_significant == 1.0
-    assert (np.sort((differences - 2).mean(axis=1)) < fewer.null_low).all()
-    assert fewer.p_familywise.max() < 0.01
+    saved, lost = joint_test(differences + 2), joint_test(differences - 2)
+    assert (saved.significant, lost.significant) == (20, 0)
+    assert max(saved.p_median, saved.p_significant, lost.p_median) < 0.01
+    assert lost.p_significant == 1.0
+    assert (np.sort((differences + 2).mean(axis=1)) > saved.null_high).all()
+    assert saved.p_familywise.max() < 0.01
 
 
 def test_rows_without_variation() -> None:
     """A row of zeros is nothing, a constant one as extreme as can be; none gives a NaN."""
     rng = np.random.default_rng(6)
     for n in (6, 30):
-        found = joint_test(np.stack([np.zeros(n), np.full(n, -0.1), rng.normal(size=n)]))
+        found = joint_test(np.stack([np.zeros(n), np.full(n, 0.1), rng.normal(size=n)]))
         assert found.p_familywise[0] == 1.0
         assert found.p_familywise[1] == pytest.approx(2 / 2**6 if n == 6 else 1e-4)
         assert found.significant >= 1

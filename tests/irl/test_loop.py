@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,19 @@ from numpy.typing import NDArray
 
 from replication import Demos
 from replication.irl import Trial, get_method, run_trial
-from replication.irl.agent import Episode
-from replication.irl.expectations import feature_expectations
+from replication.irl.agent import Agent, Episode
+from replication.irl.expectations import (
+    expert_expectations,
+    feature_expectations,
+    norm,
+    visited,
+)
+from replication.learning import reference
 from replication.paper.params import Params
-from replication.trials.condition import Condition
+from replication.trials.condition import Condition, make_agent
 
 Array = NDArray[np.float64]
+Words = NDArray[np.uint64]
 GAMMA = 0.9
 NEXT = np.array([[1, 0], [2, 0], [3, 1], [4, 2], [4, 4]])  # a corridor of five: right, left
 EXPERT = np.array([0, 1, 2, 3, 4]), np.array([0, 0, 0, 0])
@@ -29,15 +37,15 @@ class Corridor:
 
     def learn(
         self, weights: Array, q: Array, stream: NDArray[np.uint64]
-    ) -> tuple[Array, NDArray[np.uint64], int]:
-        """Solve the corridor by value iteration."""
+    ) -> tuple[Array, NDArray[np.uint64], int, int]:
+        """Solve the corridor by value iteration; say that it took 7 steps, and ever more hits."""
         self.begun.append(q)
         value = np.zeros(5)
         for _ in range(200):
             q = weights + GAMMA * value[NEXT]
             value = q.max(axis=1)
             value[4] = 0.0
-        return q, stream + np.uint64(1), 7
+        return q, stream + np.uint64(1), 7, 10 + len(self.begun)
 
     def roll_out(self, q: Array, stream: NDArray[np.uint64]) -> tuple[Episode, NDArray[np.uint64]]:
         """Follow the greedy policy for at most 30 steps."""
@@ -87,6 +95,7 @@ def test_iterations_count_weight_updates() -> None:
     trial = _trial()
     assert trial.iterations == len(trial.errors) - 1 > 0
     assert trial.steps == 7 * trial.iterations
+    assert trial.collisions.tolist() == [11 + i for i in range(trial.iterations)]
 
 
 @pytest.mark.parametrize("method", ["unified", "unified-incorrect", "adaboost"])
@@ -100,19 +109,29 @@ def test_errors_follow_from_the_episodes(method: str, cap: int) -> None:
         assert np.linalg.norm(_mu_e() - mu_i) == error
 
 
-def test_values_are_those_of_q_on_the_experts_path(small_demos: Demos) -> None:
-    """Row i of the values is max_a Q after i updates where the expert acts, by state, rounded."""
+@pytest.mark.parametrize("cap", [1, 9])
+def test_records_have_a_row_for_each_state_of_the_trial(small_demos: Demos, cap: int) -> None:
+    """Row i of values and rewards: max_a Q and max_a w after i updates where the expert acts."""
     condition = Condition(
-        small_demos, "unified", Params.of(episodes=60, horizon=40, max_iterations=9)
+        small_demos,
+        "unified",
+        Params.of(episodes=60, horizon=40, max_iterations=cap, w_start="uniform-0.001"),
     )
     trial = condition.trial(seed=np.random.SeedSequence(1), keep=True)
     assert trial.snapshots is not None
     path = sorted(small_demos.correct[0].states[:-1].tolist())
     assert path != small_demos.correct[0].states[:-1].tolist()
-    due = trial.snapshots.q.max(axis=2)[:, path].astype(np.float32)
-    assert trial.values.dtype == np.float32
-    assert due[1:].any()
-    np.testing.assert_array_equal(trial.values, due)
+    for found, tables in (
+        (trial.values, trial.snapshots.q),
+        (trial.rewards, trial.snapshots.weights),
+    ):
+        due = tables.max(axis=2)[:, path].astype(np.float32)
+        assert found.dtype == np.float32
+        assert found.shape == (trial.iterations + 1, len(path))
+        assert due[1:].any()
+        np.testing.assert_array_equal(found, due)
+    assert trial.collisions.dtype == np.int64
+    assert trial.collisions.shape == (trial.iterations,)
 
 
 def test_first_error_is_that_of_the_first_trajectory() -> None:
@@ -164,12 +183,117 @@ def test_weights_are_the_sum_of_the_updates() -> None:
         np.testing.assert_array_equal(trial.snapshots.weights[i + 1], w)
 
 
-@pytest.mark.parametrize(("q_start", "from_zero"), [("reset", True), ("kept", False)])
-def test_q_is_reset_or_kept(q_start: str, from_zero: bool) -> None:
-    """Q-START decides what the second learning call starts from."""
-    agent = Corridor()
-    _trial(agent=agent, q_start=q_start, max_iterations=2, threshold=1e-9)
-    assert (not agent.begun[1].any()) == from_zero
+# --- a whole trial, call by call -------------------------------------------------------------
+
+
+@dataclass
+class Recorder:
+    """An agent that notes what each call is given and returns."""
+
+    agent: Agent
+    calls: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of states and number of actions."""
+        return self.agent.shape
+
+    def learn(self, weights: Array, q: Array, stream: Words) -> tuple[Array, Words, int, int]:
+        """Learn as the agent does."""
+        given = {"weights": weights.copy(), "q": q.copy(), "from": stream.tolist()}
+        values, after, *counts = self.agent.learn(weights, q, stream)
+        learned = {"learned": values.copy(), "to": after.tolist(), "counts": counts}
+        self.calls.append(("learn", given | learned))
+        return values, after, counts[0], counts[1]
+
+    def roll_out(self, q: Array, stream: Words) -> tuple[Episode, Words]:
+        """Roll out as the agent does."""
+        given = {"q": q.copy(), "from": stream.tolist()}
+        episode, after = self.agent.roll_out(q, stream)
+        counts = [len(episode.actions)]
+        self.calls.append(("roll", given | {"to": after.tolist(), "counts": counts}))
+        return episode, after
+
+
+def recorded(demos: Demos, *, seed: int = 1, **choices: Any) -> tuple[Trial, Recorder, Array]:
+    """Run a trial in a maze; return its record and the expert's expectations, too."""
+    params = Params.of(**{"episodes": 20, "horizon": 30, "max_iterations": 6, **choices})
+    agent = Recorder(make_agent(demos.environment, params))
+    mu_e = expert_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
+    mu_b = visited(demos.incorrect, shape=agent.shape)
+    method = get_method("unified-incorrect")
+    trial = run_trial(
+        agent, method, mu_e, mu_b, params, seed=np.random.SeedSequence(seed), keep=True
+    )
+    return trial, agent, mu_e
+
+
+def words_between(start: list[int], end: list[int], draws: int) -> list[int]:
+    """Return the words that a stream gives from one state to another, so many draws later."""
+    words, stream = [], start[:]
+    for _ in range(draws):
+        words.append(reference.draw(stream))
+    assert stream == end
+    return words
+
+
+@pytest.mark.parametrize("q_start", ["kept", "reset"])
+def test_no_random_word_is_used_twice(small_demos: Demos, q_start: str) -> None:
+    """Learning and trajectories draw from a stream each, from end to end; no word comes again."""
+    used: list[int] = []
+    for seed in (1, 2):
+        trial, agent, _ = recorded(small_demos, q_start=q_start, seed=seed)
+        assert trial.iterations == 6
+        for kind in ("learn", "roll"):
+            calls = [call for name, call in agent.calls if name == kind]
+            for before, after in pairwise(calls):
+                assert after["from"] == before["to"]
+            for call in calls:
+                used += words_between(call["from"], call["to"], call["counts"][0])
+    assert len(used) > 2000
+    assert len(set(used)) == len(used)
+
+
+@pytest.mark.parametrize("q_start", ["kept", "reset"])
+def test_each_iteration_looks_first_and_updates_then(small_demos: Demos, q_start: str) -> None:
+    """A trajectory of Q, its error, one update, learning; from the last Q or from zero; again."""
+    trial, agent, mu_e = recorded(small_demos, q_start=q_start)
+    assert trial.snapshots is not None
+    assert [name for name, _ in agent.calls] == ["roll", "learn"] * 6 + ["roll"]
+    rolls = [call for name, call in agent.calls if name == "roll"]
+    learns = [call for name, call in agent.calls if name == "learn"]
+    assert not rolls[0]["q"].any()
+    for i, call in enumerate(rolls):
+        np.testing.assert_array_equal(call["q"], trial.snapshots.q[i])
+        episode = trial.episodes[i]
+        mu_i = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=agent.shape)
+        assert trial.errors[i] == norm(mu_e - mu_i)
+    for i, call in enumerate(learns):
+        np.testing.assert_array_equal(call["weights"], trial.snapshots.weights[i + 1])
+        np.testing.assert_array_equal(call["learned"], trial.snapshots.q[i + 1])
+        begins = trial.snapshots.q[i] if q_start == "kept" else np.zeros(agent.shape)
+        np.testing.assert_array_equal(call["q"], begins)
+    assert learns[1]["q"].any() == (q_start == "kept")
+    assert trial.steps == sum(call["counts"][0] for call in learns)
+    assert trial.collisions.tolist() == [call["counts"][1] for call in learns]
+    assert 0 < trial.collisions.sum() < trial.steps
+
+
+def test_incorrect_pairs_reach_only_the_method_that_uses_them() -> None:
+    """With all pairs marked, the method without incorrect demonstrations does as with none."""
+
+    def run(name: str, marked: bool) -> Trial:
+        mu_b = np.full((5, 2), marked)
+        seed = np.random.SeedSequence(1)
+        params = Params.of(f_index="updated")
+        return run_trial(Corridor(), get_method(name), _mu_e(), mu_b, params, seed=seed)
+
+    for name, same in (("unified", True), ("adaboost", True), ("unified-incorrect", False)):
+        none, every = run(name, False), run(name, True)
+        assert np.array_equal(none.weights, every.weights) == same
+
+
+# --- other choices of the loop ---------------------------------------------------------------
 
 
 def test_unit_norm_normalises_every_update() -> None:
@@ -198,3 +322,6 @@ def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     mu = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
     trial = _trial(agent=agent, mu_e=mu)
     assert (trial.iterations, trial.converged, agent.begun) == (0, True, [])
+    assert (trial.steps, trial.collisions.tolist()) == (0, [])
+    assert trial.collisions.dtype == np.int64
+    assert len(trial.values) == len(trial.rewards) == len(trial.episodes) == 1

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from replication import METHODS, Demos, fit
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import conditions_of
 from replication.evidence.tables import contrasts_table, summary_table
-from replication.irl import get_method
+from replication.irl import READINGS, get_method
+from replication.irl.methods import TRACES
 from replication.paper.register import ChoiceError
 from replication.report import curves
 from replication.trials.measures import measure_trials
@@ -34,6 +35,30 @@ def test_misspelt_method_is_refused_with_the_list() -> None:
         get_method("unifed")
 
 
+def test_every_reading_has_a_run_of_each_method() -> None:
+    """Under a reading that a method does not have it is run as printed; without a trace, as is."""
+    found = {name: [method.under(f) for f in READINGS] for name, method in METHODS.items()}
+    assert READINGS == (*TRACES, "at-once") == ("printed", "updated", "at-once")
+    assert found == {
+        "adaboost": ["", "", ""],
+        "unified": ["printed", "updated", "printed"],
+        "unified-incorrect": ["printed", "updated", "at-once"],
+    }
+    for method in METHODS.values():
+        assert {method.under(f) for f in READINGS} == set(method.readings)
+
+
+def test_incorrect_demonstrations_are_for_algorithm_2_alone() -> None:
+    """One method uses them; its baseline is the same method without, whose is AdaBoost-IRL."""
+    assert [name for name, method in METHODS.items() if method.uses_incorrect] == [
+        "unified-incorrect"
+    ]
+    baselines = {name: method.baseline for name, method in METHODS.items()}
+    assert baselines == {"adaboost": "", "unified": "adaboost", "unified-incorrect": "unified"}
+    with_, without = METHODS["unified-incorrect"], METHODS["unified"]
+    assert (with_.start, with_.update) == (without.start, without.update)
+
+
 def test_a_new_method_is_one_row(
     small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -50,7 +75,7 @@ def test_a_new_method_is_one_row(
     monkeypatch.setitem(METHODS, perceptron.name, perceptron)
     assert fit(small_demos, method="perceptron", seed=1).errors[-1] == 0
 
-    conditions = method_conditions(small_demos, {"episodes": 60, "horizon": 40}, METHODS)
+    conditions = conditions_of(small_demos, {"episodes": 60, "horizon": 40}, METHODS)
     every = list(conditions.values())
     results = run_trials(every, trials=3, store=Store(store_path), seed=1)
     trials = measure_trials(results, every, errors=True)
@@ -58,6 +83,7 @@ def test_a_new_method_is_one_row(
     summary = summary_table(trials, {}).set_index("method")
     assert summary.loc["perceptron", "n"] == 3
     (compared,) = contrasts_table(trials).query("x == 'perceptron'").itertuples()
+    assert (compared.reading, compared.set) == ("", "none")
     assert (compared.y, compared.n) == ("adaboost", 3)
     for picture in (
         curves.errors(trials, {}),

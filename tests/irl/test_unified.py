@@ -1,13 +1,22 @@
 from __future__ import annotations
 
+from typing import Any
+
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from replication.irl import unified
-from replication.paper.params import Update
+from replication import Demos
+from replication.irl import READINGS, get_method, run_trial, unified
+from replication.irl.expectations import expert_expectations, visited
+from replication.paper.params import Params, Update
+from replication.trials.condition import make_agent
+from replication.trials.results import digest
+
+Array = NDArray[Any]
 
 # A row of four pairs: the agent alone, the expert earlier, the expert alone, both at one time.
 # (Fig. 2 of the paper draws such a row, but with visits that cannot all occur in one trajectory:
@@ -34,23 +43,61 @@ def test_updated_reading_moves_weights_by_the_new_trace() -> None:
     np.testing.assert_allclose(w, [[-0.585, 0.0585, 0.5265, 0.0]], atol=1e-15)
 
 
-def test_incorrect_pair_that_the_agent_visits_gets_the_largest_trace() -> None:
-    """Algorithm 2, lines 11-12: F is 1 where the agent is wrong, the expert never, mu_B is set."""
-    params = Update(alpha=0.3, f_index="updated")
-    f = np.full((1, 4), 0.5)
-    w, f_next = unified.update(np.zeros((1, 4)), f, MU_E, MU_I, AGENT_ALONE, params)
+@pytest.mark.parametrize(
+    ("f_index", "marked", "unmarked"),
+    [("printed", -0.45, -0.45), ("updated", -0.9, -0.585), ("at-once", -0.9, -0.45)],
+)
+def test_marked_wrong_pair_under_each_reading(f_index: str, marked: float, unmarked: float) -> None:
+    """F_0 = 0.5, alpha = 0.3, residual -0.9: Algorithm 2's line 12 acts later, now, or at once."""
+    f, w = np.full((1, 4), 0.5), np.zeros((1, 4))
+    params = Update(alpha=0.3, f_index=f_index)
+    moved, f_next = unified.update(w, f, MU_E, MU_I, AGENT_ALONE, params)
+    plain, f_plain = unified.update(w, f, MU_E, MU_I, NONE, params)
+    assert moved[0, 0] == pytest.approx(marked, abs=1e-15)
+    assert plain[0, 0] == pytest.approx(unmarked, abs=1e-15)
     assert f_next[0, 0] == 1.0
-    assert w[0, 0] == pytest.approx(-0.9)
+    assert f_plain[0, 0] == pytest.approx(0.65)
+    # The other pairs do not notice.
+    np.testing.assert_array_equal(moved[0, 1:], plain[0, 1:])
+    np.testing.assert_array_equal(f_next[0, 1:], f_plain[0, 1:])
+    # In the next iteration the printed reading moves by the 1 that was set, too.
+    then, f_then = unified.update(w, f_next, MU_E, MU_I, AGENT_ALONE, params)
+    assert then[0, 0] == pytest.approx(-0.9, abs=1e-15)
+    assert f_then[0, 0] == 1.0
 
 
+def test_a_marked_pair_is_set_anew_each_time() -> None:
+    """Between two marked visits the trace decays by Eq. 10; the second sets it to 1 again."""
+    params = Update(alpha=0.3)
+    w, f = np.zeros((1, 4)), np.full((1, 4), 0.5)
+    moves = []
+    for mu_i in (MU_I, MU_E, MU_I, MU_I):  # wrong, as the expert does, wrong, wrong
+        then, f = unified.update(w, f, MU_E, mu_i, AGENT_ALONE, params)
+        moves.append(then[0, 0] - w[0, 0])
+        w = then
+    assert moves == pytest.approx([-0.9 * 0.5, 0.0, -0.9 * 0.7, -0.9])
+
+
+@pytest.mark.parametrize("f_index", READINGS)
 @pytest.mark.parametrize("column", [1, 2, 3])
-def test_incorrect_pair_of_the_experts_is_not_special(column: int) -> None:
+def test_incorrect_pair_of_the_experts_is_not_special(column: int, f_index: str) -> None:
     """A pair that the expert visits is never treated as incorrect, whatever mu_B says."""
     mu_b = np.zeros((1, 4), dtype=bool)
     mu_b[0, column] = True
-    f = np.full((1, 4), 0.5)
-    marked = unified.update(np.zeros((1, 4)), f, MU_E, MU_I, mu_b, Update())
-    plain = unified.update(np.zeros((1, 4)), f, MU_E, MU_I, NONE, Update())
+    assert_like_unmarked(MU_E, MU_I, mu_b, f_index)
+
+
+@pytest.mark.parametrize("f_index", READINGS)
+def test_incorrect_pair_that_the_agent_avoids_is_not_special(f_index: str) -> None:
+    """A pair that the agent did not visit is not treated as incorrect, in any iteration."""
+    assert_like_unmarked(MU_E, MU_I * [[0.0, 1.0, 1.0, 1.0]], AGENT_ALONE, f_index)
+
+
+def assert_like_unmarked(mu_e: Array, mu_i: Array, mu_b: Array, f_index: str) -> None:
+    """Assert that marks change no bit of weights and trace."""
+    f, w, params = np.full((1, 4), 0.5), np.zeros((1, 4)), Update(alpha=0.3, f_index=f_index)
+    marked = unified.update(w, f, mu_e, mu_i, mu_b, params)
+    plain = unified.update(w, f, mu_e, mu_i, NONE, params)
     for one, other in zip(marked, plain, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -64,7 +111,7 @@ visits = hnp.arrays(float, (3, 4), elements=st.floats(0, 10, allow_subnormal=Fal
 marks = hnp.arrays(bool, (3, 4))
 
 
-@given(visits, visits, marks, st.sampled_from(["printed", "updated"]))
+@given(visits, visits, marks, st.sampled_from(READINGS))
 def test_trace_stays_in_range_and_weights_follow_the_residual(
     mu_e: np.ndarray, mu_i: np.ndarray, mu_b: np.ndarray, f_index: str
 ) -> None:
@@ -74,6 +121,48 @@ def test_trace_stays_in_range_and_weights_follow_the_residual(
     assert ((f_next > 0) & (f_next <= 1)).all()
     assert (np.sign(w) == np.sign(mu_e - mu_i)).all()
     assert (np.abs(w) <= np.abs(mu_e - mu_i)).all()
+
+
+@given(visits, visits, marks, hnp.arrays(float, (3, 4), elements=st.floats(0.01, 1)))
+def test_readings_differ_by_their_trace_alone(
+    mu_e: np.ndarray, mu_i: np.ndarray, mu_b: np.ndarray, f: np.ndarray
+) -> None:
+    """All have the same next trace; at once is the updated one where marked, else the printed."""
+    w = np.zeros((3, 4))
+    moved, traces = {}, []
+    for reading in READINGS:
+        moved[reading], f_next = unified.update(w, f, mu_e, mu_i, mu_b, Update(f_index=reading))
+        traces.append(f_next)
+    assert (traces[0] == traces[1]).all()
+    assert (traces[0] == traces[2]).all()
+    wrong = mu_b & (mu_e == 0) & (mu_i > 0)
+    assert (traces[0][wrong] == 1).all()
+    expected = np.where(wrong, moved["updated"], moved["printed"])
+    np.testing.assert_array_equal(moved["at-once"], expected)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_at_once_is_printed_without_incorrect_demonstrations(small_demos: Demos, seed: int) -> None:
+    """Identity: with nothing marked, whole trials of both readings have the same bits."""
+    choices = {"episodes": 60, "horizon": 40, "max_iterations": 30}
+    shape = small_demos.environment.n_states, small_demos.environment.n_actions
+    mu_e = expert_expectations(small_demos.correct, gamma=0.9, shape=shape)
+    digests = {}
+    for reading in READINGS:
+        for shown in ((), small_demos.incorrect):
+            params = Params.of(**choices, f_index=reading)
+            trial = run_trial(
+                make_agent(small_demos.environment, params),
+                get_method("unified-incorrect"),
+                mu_e,
+                visited(shown, shape=shape),
+                params,
+                seed=np.random.SeedSequence(seed),
+            )
+            digests[reading, bool(shown)] = digest(trial)
+    assert digests["at-once", False] == digests["printed", False]
+    assert digests["at-once", True] != digests["printed", True]
+    assert len(set(digests.values())) == 5
 
 
 @given(visits, marks)

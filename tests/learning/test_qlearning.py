@@ -1,3 +1,4 @@
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -169,6 +170,126 @@ def test_inputs_are_not_modified(arrays: dict[str, Any]) -> None:
     assert all(same_bits(array, before[name]) for name, array in arrays.items())
 
 
+# --- arithmetic ------------------------------------------------------------------------------
+
+
+finite = st.floats(-1e100, 1e100, allow_subnormal=False)
+
+
+@given(finite, finite, finite)
+def test_fma_is_the_exact_result_rounded_once(a: float, b: float, c: float) -> None:
+    """No other float is nearer to a b + c, computed in rational numbers, than the one returned."""
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    found = reference.fma(a, b, c)
+    for other in (np.nextafter(found, -np.inf), np.nextafter(found, np.inf)):
+        assert abs(Fraction(found) - exact) <= abs(Fraction(float(other)) - exact)
+    assert found == pytest.approx(a * b + c, rel=1e-9, abs=1e-15 * abs(c))
+
+
+def test_fma_by_hand() -> None:
+    """(1 + u)(1 - u) - 1 is -u^2: rounded twice it is 0, rounded once it is not."""
+    u = 2.0**-30
+    assert (1 + u) * (1 - u) - 1 == 0.0
+    assert reference.fma(1 + u, 1 - u, -1.0) == -(u**2)
+    assert reference.fused(0.0, -1.0, 1 - u, 1.0, 1 + u) == -(u**2)
+    assert reference.double(0.0, -1.0, 1 - u, 1.0, 1 + u) == 0.0
+    assert np.signbit(reference.fma(-1.0, 0.0, -0.0))
+    assert not np.signbit(reference.fma(1.0, 0.0, -0.0))
+
+
+@given(*(st.floats(-1e3, 1e3) for _ in range(3)), st.floats(0, 1), st.floats(0, 1))
+def test_roundings_agree_to_their_precision(
+    q: float, reward: float, value: float, beta: float, gamma: float
+) -> None:
+    """All three are Eq. 1 in exact numbers, but for some units of the last place."""
+    exact = Fraction(q) + Fraction(beta) * (
+        Fraction(reward) + Fraction(gamma) * Fraction(value) - Fraction(q)
+    )
+    size = abs(q) + abs(reward) + abs(value) + 1e-30
+    for name, unit in (("double", 2.0**-52), ("fused", 2.0**-52), ("single", 2.0**-22)):
+        found = reference.ROUNDED[name](q, reward, value, beta, gamma)
+        assert abs(float(Fraction(found) - exact)) <= 4 * unit * size
+
+
+@pytest.fixture(scope="module")
+def rounded() -> dict[str, tuple[Array, int, int]]:
+    """Learn the same task in each arithmetic, exploring in every step: along the same way."""
+    rng = np.random.default_rng(4)
+    weights, zeros = rng.normal(size=(25, 4)), np.zeros((25, 4))
+    task = LEARN | {"epsilon": 1.0, "episodes": 200}
+    found = {}
+    for name in reference.ROUNDED:
+        learned = qlearning.learn(
+            grid(5, 5), weights, zeros, make_stream(6), **task, arithmetic=name
+        )
+        found[name] = (learned[0], *learned[2:])
+    return found
+
+
+def test_fused_differs_by_rounding_only(rounded: dict[str, tuple[Array, int, int]]) -> None:
+    """Rounding once gives other bits somewhere, and nowhere another number to 13 digits."""
+    double, fused = rounded["double"], rounded["fused"]
+    assert (double[0] != fused[0]).any()
+    np.testing.assert_allclose(fused[0], double[0], rtol=1e-13, atol=1e-13)
+    assert fused[1:] == double[1:]
+
+
+def test_single_is_in_32_bits(rounded: dict[str, tuple[Array, int, int]]) -> None:
+    """Its values are numbers of 32 bits, near those of 64 bits, and not these, rounded at last."""
+    double, single = rounded["double"], rounded["single"]
+    assert (single[0].astype(np.float32) == single[0]).all()
+    assert (double[0].astype(np.float32) != double[0]).any()
+    assert (double[0].astype(np.float32) != single[0]).any()
+    np.testing.assert_allclose(single[0], double[0], rtol=1e-4, atol=1e-5)
+    assert single[1:] == double[1:]
+
+
+def test_single_holds_no_large_numbers(arrays: dict[str, Any]) -> None:
+    """What 32 bits could not hold is refused in 32 bits alone."""
+    large = arrays | {"weights": np.full((25, 4), 1e31)}
+    qlearning.learn(**large, **LEARN)
+    with pytest.raises(ValueError, match="weights must be finite"):
+        qlearning.learn(**large, **LEARN, arithmetic="single")
+
+
+# --- by hand ---------------------------------------------------------------------------------
+
+
+def test_collisions_by_hand() -> None:
+    """In a corridor from which nothing leads back, each step that stays is a collision."""
+    # Action 0 stays, action 1 moves on; staying in 0 and 1 is preferred until it has been tried.
+    next_state = [[0, 1], [1, 2], [2, 2]]
+    q = [[2.0, 1.0], [2.0, 1.0], [0.0, 0.0]]
+    task: dict[str, Any] = {"start": 0, "goal": 2, "beta": 1.0, "gamma": 0.0, "epsilon": 0.0}
+    zero = np.zeros((3, 2))
+
+    def run(episodes: int, horizon: int) -> tuple[int, ...]:
+        options = task | {"episodes": episodes, "horizon": horizon}
+        return qlearning.learn(next_state, zero, q, make_stream(1), **options)[2:]
+
+    # Stays in 0 (worth 0 from now on), moves to 1, stays there, moves to the goal: 4 steps, 2 hits.
+    assert run(1, 9) == (4, 2)
+    assert run(1, 3) == (3, 2)
+    assert run(1, 1) == (1, 1)
+    # Staying for ever: nothing is ever learned, and every step is a collision.
+    stays = qlearning.learn(
+        [[0]],
+        [[0.0]],
+        [[0.0]],
+        make_stream(1),
+        **task | {"goal": 0} | {"episodes": 3, "horizon": 7},
+    )
+    assert stays[2:] == (3, 3)  # the goal is where it is, so that each episode ends at once
+    loop = qlearning.learn(
+        [[0], [1]],
+        np.zeros((2, 1)),
+        np.zeros((2, 1)),
+        make_stream(1),
+        **task | {"goal": 1, "episodes": 3, "horizon": 7},
+    )
+    assert loop[2:] == (21, 21)
+
+
 def test_worked_example() -> None:
     """By hand: two greedy episodes along a corridor carry the last reward one state back."""
     weights = [[0.0, 0.0], [0.0, 0.0], [0.0, 8.0], [0.0, 0.0]]  # 8 for the step into the goal
@@ -331,6 +452,7 @@ def test_stream_is_never_all_zero() -> None:
         ({"tolerance": -1e-9}, "tolerance must be at least 0 and less than 1"),
         ({"tolerance": 1}, "tolerance must be at least 0 and less than 1"),
         ({"tolerance": np.nan}, "tolerance must be at least 0 and less than 1"),
+        ({"arithmetic": "half"}, "arithmetic must be double, fused, single, not 'half'"),
     ],
 )
 def test_what_does_not_fit_is_refused(

@@ -3,40 +3,43 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy import stats
 
-from replication import Demos, Params, load_demos
+from replication import Demos, load_demos
 from replication.envs.maze import as_maze
-from replication.evidence.experiments import EXPERIMENTS, method_conditions
+from replication.evidence.experiments import EXPERIMENTS, NONE, Key, conditions_of
 from replication.evidence.tables import read_table, write_csv
 from replication.files import resolve
 from replication.irl import Trial
 from replication.irl.agent import Episode
 from replication.trials.condition import Condition
 from replication.trials.measures import (
+    KINDS,
     Report,
-    early_errors,
     early_iterations,
     error_histories,
+    factors,
+    kind_pairs,
     marked_pairs,
     measure,
     measure_trials,
-    shown_demos,
-    slope,
+    planned_trials,
 )
 from replication.trials.results import Results, digest
 from replication.trials.run import run_trials
 from replication.trials.store import Store
 
 FEW = {"episodes": 100, "horizon": 40}
-NAMES = ["iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope"]
+OF_ALL = [
+    *("iterations", "converged", "early_collisions", "early_errors"),
+    *("q_growth", "reward_growth", "acted", "acted_at_first"),
+]
+NAMES = [*OF_ALL, "with_hit", "with_detour", "with_opposite"]
 
 
 def episode(*moves: tuple[int, int, bool]) -> Episode:
@@ -45,66 +48,80 @@ def episode(*moves: tuple[int, int, bool]) -> Episode:
     return Episode(np.append(states, 9), actions, hits.astype(bool))
 
 
-def made(
-    demos: Demos,
-    *,
-    iterations: int = 8,
-    values: NDArray[np.floating] | None = None,
-    weights: NDArray[np.float64] | None = None,
-    episodes: tuple[Episode, ...] = (),
-    converged: bool = True,
-) -> Trial:
+def made(demos: Demos, *, iterations: int = 8, **parts: Any) -> Trial:
     """Make up a trial."""
     shape = demos.environment.n_states, demos.environment.n_actions
-    moves = len(demos.correct[0].actions)
-    blank = np.zeros((iterations + 1, moves)) if values is None else values
-    return Trial(
-        errors=np.linspace(1.0, 0.0, iterations + 1),
-        converged=converged,
-        steps=1,
-        weights=np.zeros(shape) if weights is None else weights,
-        q=np.zeros(shape),
-        episodes=episodes,
-        values=blank.astype(np.float32),
-    )
+    blank = np.zeros((iterations + 1, len(demos.correct[0].actions)))
+    usual: dict[str, Any] = {
+        "errors": np.linspace(1.0, 0.0, iterations + 1),
+        "converged": True,
+        "steps": 1,
+        "weights": np.zeros(shape),
+        "q": np.zeros(shape),
+        "episodes": (episode((0, 0, False)),) * (iterations + 1),
+        "collisions": np.zeros(iterations, np.int64),
+        "values": blank,
+        "rewards": blank,
+    }
+    usual |= parts
+    return Trial(**{**usual, **{f: usual[f].astype(np.float32) for f in ("values", "rewards")}})
 
 
-# --- erroneous motions -----------------------------------------------------------------------
+def pairs_of(demos: Demos, *pairs: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return an array that is true at some pairs."""
+    chosen = np.zeros((demos.environment.n_states, demos.environment.n_actions), dtype=bool)
+    for pair in pairs:
+        chosen[pair] = True
+    return chosen
 
 
-def test_early_errors_by_hand() -> None:
-    """Hits and marked pairs count once each, after updates 1 to E only."""
-    marked = np.zeros((10, 4), dtype=bool)
-    marked[2, 1] = marked[3, 0] = True
+def measured(
+    trial: Trial, demos: Demos, *shown: tuple[int, int], report: Report | None = None
+) -> dict[str, float]:
+    """Measure a made-up trial, given the pairs that its method was shown."""
+    kinds = kind_pairs(demos)
+    return measure(trial, demos, kinds, pairs_of(demos, *shown), report or Report())
+
+
+# --- the initial phase -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("early", "expected"), [(0.1, 1111), (0.25, 1111111111), (0.5, 10**10)])
+def test_early_collisions_by_hand(small_demos: Demos, early: float, expected: int) -> None:
+    """Those of the first E learning calls are added up: of 4, 10 or 20 here of the mazes' 40."""
+    powers = 10 ** np.arange(12)
+    trial = made(small_demos, iterations=12, collisions=powers)
+    found = measured(trial, small_demos, report=Report(early=early))["early_collisions"]
+    assert found == (expected if early < 0.5 else powers.sum())
+
+
+def test_early_errors_by_hand(small_demos: Demos) -> None:
+    """Hits and marked pairs count once each, in the trajectories after updates 1 to E only."""
+    wrong = [(int(s), int(a)) for s, a in np.argwhere(marked_pairs(small_demos))]
+    (one, up), (two, down), *_ = wrong
+    fine = next((s, a) for s in range(42) for a in range(4) if (s, a) not in wrong)
     episodes = (
-        episode((2, 1, True), (3, 0, True)),  # before the first update: not counted
-        episode((1, 0, True), (2, 1, False), (2, 0, False)),  # a hit and a marked pair: 2
-        episode((2, 1, True), (2, 1, False)),  # one motion that is both, and a marked pair: 2
-        episode((4, 0, False)),  # none
-        episode((3, 0, False), (3, 0, False)),  # the same pair twice: 2
+        episode((one, up, True), (two, down, True)),  # before the first update: not counted
+        episode((*fine, True), (one, up, False), (*fine, False)),  # a hit and a marked pair: 2
+        episode((one, up, True), (two, down, False)),  # one that is both, and a marked pair: 2
+        episode((*fine, False)),  # none
+        episode((two, down, False), (two, down, False)),  # the same pair twice: 2
+        episode((*fine, True)),  # after update 5, not counted if E is 4
     )
-    demos = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
-    trial = made(demos, iterations=4, episodes=episodes)
-    assert [early_errors(trial, marked, early) for early in (0, 1, 2, 3, 4, 10)] == [
-        0,
-        2,
-        4,
-        4,
-        6,
-        6,
-    ]
+    trial = made(small_demos, iterations=5, episodes=episodes)
+    assert measured(trial, small_demos, report=Report(early=0.1))["early_errors"] == 6
+    assert measured(trial, small_demos)["early_errors"] == 7
 
 
-def test_without_marked_pairs_only_hits_count(small_demos: Demos, results: Results) -> None:
-    """Identity: with nothing marked, the measure is the number of hits in the trajectories."""
-    for condition in results.conditions:
-        trial = results.trial(condition, 1)
-        nothing = np.zeros(trial.weights.shape, dtype=bool)
-        due = sum(int(one.hits.sum()) for one in trial.episodes[1:11])
-        assert early_errors(trial, nothing, 10) == due
-        assert early_errors(trial, nothing, 10) <= early_errors(
-            trial, marked_pairs(small_demos), 10
-        )
+def test_errors_are_by_all_stored_mistakes(small_demos: Demos) -> None:
+    """Whatever a method was shown, motions are held against every stored demonstration."""
+    wrong = [(int(s), int(a)) for s, a in np.argwhere(marked_pairs(small_demos))]
+    episodes = (episode((0, 0, False)), *(episode((s, a, False)) for s, a in wrong[:8]))
+    trial = made(small_demos, episodes=episodes)
+    for shown in ((), tuple(wrong[:3]), tuple(wrong)):
+        assert measured(trial, small_demos, *shown)["early_errors"] == 8
+    alone = small_demos.select("none")
+    assert measured(trial, alone)["early_errors"] == 0
 
 
 def test_marked_pairs_are_those_of_no_correct_demonstration(small_demos: Demos) -> None:
@@ -122,18 +139,6 @@ def test_marked_pairs_are_those_of_no_correct_demonstration(small_demos: Demos) 
     assert not marked_pairs(small_demos.select("none")).any()
 
 
-def test_every_method_is_measured_by_the_same_pairs(small_demos: Demos) -> None:
-    """The method that is not shown incorrect demonstrations has its motions counted by them."""
-    for kinds in ("hit+detour", "hit"):
-        conditions = method_conditions(small_demos, {**FEW, "incorrect": kinds}).values()
-        assert {condition.selected.incorrect for condition in conditions} == {
-            (),
-            small_demos.select(kinds).incorrect,
-        }
-        for condition in conditions:
-            assert shown_demos(condition) == small_demos.select(kinds)
-
-
 def test_initial_phase_is_the_first_quarter() -> None:
     """EARLY: 10 of the reported 40 iterations in the mazes, 4 of 15 in robot soccer."""
     with warnings.catch_warnings():
@@ -145,121 +150,188 @@ def test_initial_phase_is_the_first_quarter() -> None:
     assert early_iterations(demos["soccer"], Report(early=0.5)) == 8
 
 
-# --- slopes ----------------------------------------------------------------------------------
+# --- where incorrect demonstrations act ------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("values", "due"),
-    [
-        ([1.0, 2.0, 30.0], 1.0),
-        ([3.0, 2.5, -1.0], -1.0),
-        ([2.0, 2.0, 2.0], 0.0),
-        ([5.0], 0.0),
-        ([1.0, 1.0, 2.0], 0.75**0.5),  # ranks 1.5, 1.5, 3 against 1, 2, 3
-    ],
-)
-def test_slope_by_hand(values: list[float], due: float) -> None:
-    """The rank correlation with the position: 1 if all grow, -1 if all fall, 0 if none does."""
-    assert slope(np.array(values)) == pytest.approx(due)
+def test_acted_by_hand(small_demos: Demos) -> None:
+    """Pairs that the method was shown, once per trajectory; the first trajectory is apart."""
+    shown = (3, 1), (5, 2)
+    episodes = (
+        episode((3, 1, False), (5, 2, True), (4, 0, False), (3, 1, False)),  # 2 pairs
+        episode((3, 1, False), (3, 1, False)),  # 1
+        episode((3, 0, False), (4, 1, False)),  # none: another action, another state
+        episode((5, 2, True), (3, 1, True)),  # 2
+    )
+    trial = made(small_demos, iterations=3, episodes=episodes)
+    found = measured(trial, small_demos, *shown)
+    assert (found["acted_at_first"], found["acted"]) == (2, 3)
+    found = measured(trial, small_demos)
+    assert (found["acted_at_first"], found["acted"]) == (0, 0)
 
 
-@given(st.lists(st.integers(-5, 5), min_size=2, max_size=30))
-def test_slope_is_spearmans(values: list[int]) -> None:
-    """With any ties it is SciPy's coefficient, and 0 where that does not exist."""
-    sample = np.array(values, dtype=float)
-    if np.ptp(sample) == 0:
-        assert slope(sample) == 0.0
-    else:
-        due = stats.spearmanr(np.arange(len(sample)), sample).statistic
-        assert slope(sample) == pytest.approx(due)
-
-
-# --- one trial -------------------------------------------------------------------------------
-
-
-def test_values_are_read_along_the_path(small_demos: Demos) -> None:
-    """Columns of values are states in ascending order; the slope is along the demonstration."""
-    path = small_demos.correct[0].states[:-1]
-    assert path.tolist() != sorted(path.tolist())
-    steps = np.argsort(np.argsort(path))  # the column of the state of each step
-    values = np.zeros((9, len(path)))
-    values[-1, steps] = np.arange(len(path))  # Q grows with each step
-    weights = np.zeros((small_demos.environment.n_states, 4))
-    weights[path, 2] = -np.arange(len(path)) - 1.0  # and the best reward falls
-    weights[path, :2] = weights[path, 3:] = -100.0
-    trial = made(small_demos, values=values, weights=weights)
-    found = measure(trial, small_demos, np.zeros((42, 4), dtype=bool), Report())
-    assert found["q_slope"] == pytest.approx(1.0)
-    assert found["reward_slope"] == pytest.approx(-1.0)
+def test_kinds_are_counted_by_trajectory(small_demos: Demos) -> None:
+    """with_<kind>: in how many trajectories after the first a pair is that this kind marks."""
+    kinds = kind_pairs(small_demos)
+    assert (
+        list(kinds)
+        == ["hit", "detour", "opposite"]
+        == [kind for kind in KINDS if kind in small_demos.kinds]
+    )
+    for kind, pairs in kinds.items():
+        np.testing.assert_array_equal(pairs, marked_pairs(small_demos.select(kind)))
+    hits, turns = (
+        [(int(s), int(a)) for s, a in np.argwhere(kinds[kind] & ~kinds[other])]
+        for kind, other in (("hit", "opposite"), ("opposite", "hit"))
+    )
+    hit, opposite = (*hits[0], True), (*turns[0], False)
+    assert not kinds["detour"][turns[0]]
+    episodes = (
+        episode(hit, opposite),  # a random walk: not counted
+        episode(hit, hit),
+        episode(hit, opposite),
+        episode((41, 0, False)),
+        episode(opposite),
+        episode(opposite),
+    )
+    found = measured(made(small_demos, iterations=5, episodes=episodes), small_demos)
+    assert (found["with_hit"], found["with_opposite"]) == (2, 3)
+    assert found["with_detour"] == 2 * kinds["detour"][hits[0]]
     assert list(found) == NAMES
+
+
+# --- growth ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("mid_term", "middle"), [(0.25, 2), (0.5, 4), (0.75, 6)])
 def test_growth_is_from_the_mid_term(small_demos: Demos, mid_term: float, middle: int) -> None:
     """FIG7-MIDTERM: the mean of the last values less that after the given share of updates."""
     moves = len(small_demos.correct[0].actions)
-    values = np.random.default_rng(1).normal(size=(9, moves)).astype(np.float32)
-    trial = made(small_demos, values=values)
-    marked = np.zeros((42, 4), dtype=bool)
-    found = measure(trial, small_demos, marked, Report(mid_term=mid_term))["q_growth"]
-    assert found == pytest.approx(float(values[8].mean() - values[middle].mean()), abs=1e-6)
+    rng = np.random.default_rng(1)
+    values, rewards = rng.normal(size=(2, 9, moves)).astype(np.float32)
+    trial = made(small_demos, values=values, rewards=rewards)
+    found = measured(trial, small_demos, report=Report(mid_term=mid_term))
+    for name, table in (("q_growth", values), ("reward_growth", rewards)):
+        due = float(table[8].mean() - table[middle].mean())
+        assert found[name] == pytest.approx(due, abs=1e-6)
 
 
-def test_states_that_other_demonstrations_add_are_left_out(small_demos: Demos) -> None:
-    """With two correct demonstrations the values of the first one's path are the measured ones."""
-    maze, first = as_maze(small_demos.environment), small_demos.correct[0]
-    turned = np.array([*[0] * 3, *[2] * 4])
-    other = replace(first, name="other", actions=turned, states=maze.replay(turned.tolist()))
-    both = replace(small_demos, correct=(first, other))
-    known = np.unique(np.concatenate([first.states[:-1], other.states[:-1]]))
-    values = np.zeros((9, len(known)))
-    values[-1] = np.isin(known, first.states)
-    trial = made(small_demos, values=values)
-    found = measure(trial, both, np.zeros((42, 4), dtype=bool), Report())
-    assert found["q_growth"] == 1.0
+def test_growth_by_hand(small_demos: Demos) -> None:
+    """Values that rise by one in each iteration grow by half of their number; rewards may fall."""
+    moves = len(small_demos.correct[0].actions)
+    rising = np.repeat(np.arange(9.0)[:, None], moves, axis=1)
+    found = measured(made(small_demos, values=rising, rewards=-3 * rising), small_demos)
+    assert (found["q_growth"], found["reward_growth"]) == (4.0, -12.0)
 
 
 def test_trial_at_the_cap_is_told(small_demos: Demos) -> None:
     """A trial that has not converged has its iterations and a zero."""
-    trial = made(small_demos, iterations=5, converged=False)
-    found = measure(trial, small_demos, np.zeros((42, 4), dtype=bool), Report())
+    found = measured(made(small_demos, iterations=5, converged=False), small_demos)
     assert (found["iterations"], found["converged"]) == (5, 0)
+
+
+def test_states_of_all_correct_demonstrations_are_measured(small_demos: Demos) -> None:
+    """With two correct demonstrations, Q is that where either acts."""
+    maze, first = as_maze(small_demos.environment), small_demos.correct[0]
+    turned = np.array([*[0] * 3, *[2] * 4])
+    other = replace(first, name="other", actions=turned, states=maze.replay(turned.tolist()))
+    both = replace(small_demos, correct=(first, other))
+    (condition,) = conditions_of(both, {**FEW, "max_iterations": 2}, ["adaboost"]).values()
+    trial = condition.trial(seed=np.random.SeedSequence(1))
+    known = {*first.states[:-1].tolist(), *other.states[:-1].tolist()}
+    assert trial.values.shape == (3, len(known))
+    expected = trial.q[sorted(known)].max(axis=1)
+    np.testing.assert_array_equal(trial.values[-1], expected.astype(np.float32))
 
 
 # --- all trials ------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def results(small_demos: Demos, tmp_path_factory: pytest.TempPathFactory) -> Results:
+def conditions(small_demos: Demos) -> dict[Key, Condition]:
+    """Return all conditions of a small maze."""
+    return conditions_of(small_demos, FEW)
+
+
+@pytest.fixture(scope="module")
+def results(conditions: dict[Key, Condition], tmp_path_factory: pytest.TempPathFactory) -> Results:
     """Run a few trials of every method."""
-    conditions = list(method_conditions(small_demos, FEW).values())
     store = Store(tmp_path_factory.mktemp("measures") / "trials.sqlite")
-    return run_trials(conditions, trials=3, store=store, seed=2)
+    return run_trials(list(conditions.values()), trials=3, store=store, seed=2)
 
 
-def test_there_is_a_row_for_each_trial_and_method(small_demos: Demos, results: Results) -> None:
+def test_there_is_a_row_for_each_trial(conditions: dict[Key, Condition], results: Results) -> None:
     """Rows are keyed by task, method, reading, set and trial, and end with steps and digest."""
-    conditions = method_conditions(small_demos, FEW)
     table = measure_trials(results, conditions.values())
     keys = ["task", "method", "reading", "set", "trial"]
     assert table.columns.tolist() == [*keys, "seed", *NAMES, "steps", "digest"]
-    sets = {"adaboost": "none", "unified": "none", "unified-incorrect": "hit+detour"}
-    expected = [("small", name, f, sets[name], k) for name, f in conditions for k in range(3)]
+    expected = [("small", *key, k) for key in conditions for k in range(3)]
     assert list(table[keys].itertuples(index=False, name=None)) == expected
     assert set(table["seed"]) == {2}
-    for (method, f), condition in conditions.items():
-        rows = table[(table["method"] == method) & (table["reading"] == f)]
+    planned = planned_trials(conditions.values(), 3, 2)
+    pd.testing.assert_frame_equal(table[[*keys, "seed"]], planned)
+    for key, condition in conditions.items():
+        rows = table[(table[["method", "reading", "set"]] == list(key)).all(axis=1)]
         trials = [results.trial(condition, k) for k in range(3)]
         assert rows["iterations"].tolist() == [trial.iterations for trial in trials]
         assert rows["converged"].tolist() == [int(trial.converged) for trial in trials]
         assert rows["steps"].tolist() == [trial.steps for trial in trials]
         assert rows["digest"].tolist() == [digest(trial) for trial in trials]
-    assert set(table[table["method"] == "adaboost"]["reading"]) == {""}
 
 
-def test_histories_are_read_back(small_demos: Demos, results: Results) -> None:
+def test_measures_of_trials_by_their_definition(
+    small_demos: Demos, conditions: dict[Key, Condition], results: Results
+) -> None:
+    """Collisions, errors and acts of line 12, counted anew with sets of pairs."""
+    table = measure_trials(results, conditions.values())
+    by_key = dict(list(table.groupby(["method", "reading", "set"])))
+
+    def taken(*demos: Any) -> set[tuple[int, int]]:
+        return {
+            pair for demo in demos for pair in zip(demo[0].tolist(), demo[1].tolist(), strict=False)
+        }
+
+    expert = taken(*((demo.states, demo.actions) for demo in small_demos.correct))
+    stored = taken(*((demo.states, demo.actions) for demo in small_demos.incorrect)) - expert
+    for key, condition in conditions.items():
+        selected = [(demo.states, demo.actions) for demo in condition.selected.incorrect]
+        shown = taken(*selected) - expert
+        for k, row in enumerate(by_key[key].to_dict("records")):
+            trial = results.trial(condition, k)
+            acted = [len(taken(each[:2]) & shown) for each in trial.episodes]
+            assert (row["acted_at_first"], row["acted"]) == (acted[0], sum(acted[1:]))
+            errors = [
+                hit or (state, action) in stored
+                for states, actions, hits in trial.episodes[1:11]
+                for state, action, hit in zip(
+                    states[:-1].tolist(), actions.tolist(), hits.tolist(), strict=True
+                )
+            ]
+            assert row["early_errors"] == sum(errors)
+            assert row["early_collisions"] == sum(trial.collisions.tolist()[:10])
+    assert table.loc[table["set"] == NONE, ["acted", "acted_at_first"]].eq(0).all(axis=None)
+    assert table.loc[table["set"] != NONE, "acted_at_first"].gt(0).any()
+
+
+def test_same_seed_begins_with_the_same_walk(
+    conditions: dict[Key, Condition], results: Results
+) -> None:
+    """Trial k of all conditions has the same first trajectory: what makes comparisons paired."""
+    for k in range(3):
+        first = [results.trial(one, k).episodes[0].states.tolist() for one in conditions.values()]
+        assert all(states == first[0] for states in first)
+    starts = {tuple(results.trial(results.conditions[0], k).episodes[0].states) for k in range(3)}
+    assert len(starts) == 3
+
+
+def test_factors_tell_all_conditions_apart(conditions: dict[Key, Condition]) -> None:
+    """No two conditions have the same task, method, reading and set."""
+    keys = {tuple(factors(condition).values()) for condition in conditions.values()}
+    assert keys == {("small", *key) for key in conditions}
+    assert len(keys) == 9
+
+
+def test_histories_are_read_back(conditions: dict[Key, Condition], results: Results) -> None:
     """Each trial's errors are in its row, to ten digits; after its end it keeps its last one."""
-    conditions = method_conditions(small_demos, FEW)
     table = measure_trials(results, conditions.values(), errors=True)
     trials = [results.trial(one, k) for one in conditions.values() for k in range(3)]
     histories = error_histories(table)
@@ -269,30 +341,24 @@ def test_histories_are_read_back(small_demos: Demos, results: Results) -> None:
         assert (row[trial.iterations :] == trial.errors[-1]).all()
 
 
-def test_trials_survive_their_file(small_demos: Demos, results: Results, tmp_path: Path) -> None:
+def test_trials_survive_their_file(
+    conditions: dict[Key, Condition], results: Results, tmp_path: Path
+) -> None:
     """What is written to trials.csv reads back as the same table, bit by bit."""
-    table = measure_trials(results, method_conditions(small_demos, FEW).values())
+    table = measure_trials(results, conditions.values())
     read = read_table(write_csv(table, tmp_path / "trials.csv"))
     pd.testing.assert_frame_equal(table, read, check_dtype=False, check_exact=True)
 
 
-def test_report_reaches_every_trial(small_demos: Demos, results: Results) -> None:
-    """A longer initial phase has no fewer errors, and the growth is from the given mid-term."""
-    conditions = method_conditions(small_demos, FEW)
+def test_report_reaches_every_trial(conditions: dict[Key, Condition], results: Results) -> None:
+    """A shorter initial phase has no more errors, and the growth is from the given mid-term."""
     usual, other = (
         measure_trials(results, conditions.values(), report)
-        for report in (None, Report(early=0.5, mid_term=0.75))
+        for report in (None, Report(early=0.1, mid_term=0.75))
     )
-    assert (other["early_errors"] >= usual["early_errors"]).all()
-    assert (other["q_growth"] != usual["q_growth"]).any()
-    same = [name for name in usual if name not in ("early_errors", "q_growth")]
+    changed = ["early_errors", "early_collisions", "q_growth", "reward_growth"]
+    assert (other[changed[:2]] <= usual[changed[:2]]).all(axis=None)
+    for name in changed:
+        assert (other[name] != usual[name]).any()
+    same = [name for name in usual if name not in changed]
     assert usual[same].equals(other[same])
-
-
-def test_setting_without_demonstrations_counts_hits(small_demos: Demos, results: Results) -> None:
-    """Where no incorrect demonstrations are chosen, the measured errors are hits alone."""
-    condition = Condition(small_demos, "unified", Params.of(**FEW, incorrect="none"))
-    own = measure_trials(results, [condition])
-    for k, errors in enumerate(own["early_errors"]):
-        episodes = results.trial(condition, k).episodes[1:11]
-        assert errors == sum(int(one.hits.sum()) for one in episodes)

@@ -41,7 +41,10 @@ def _bits(results: Results) -> list[bytes]:
         for condition in results.conditions
         for k in range(results.trials)
         for trial in [results.trial(condition, k)]
-        for array in (trial.errors, trial.weights, trial.q, trial.values, *sum(trial.episodes, ()))
+        for array in (
+            *(trial.errors, trial.weights, trial.q, trial.collisions, trial.values, trial.rewards),
+            *sum(trial.episodes, ()),
+        )
     ]
 
 
@@ -217,6 +220,9 @@ def test_digest_sees_every_part(small_demos: Demos, store_path: Path) -> None:
         replace(trial, q=trial.q + 1),
         replace(trial, values=trial.values + 1),
         replace(trial, values=trial.values.T),
+        replace(trial, rewards=trial.rewards + 1),
+        replace(trial, collisions=trial.collisions + 1),
+        replace(trial, collisions=trial.collisions[:-1]),
         replace(trial, converged=not trial.converged),
         replace(trial, steps=trial.steps + 1),
         replace(trial, episodes=trial.episodes[1:]),

@@ -35,7 +35,8 @@ from replication.trials.store import Store
 def batch(b, value):
     table, few = np.full((100, 4), float(value)), np.arange(2)
     episodes = (Episode(few, few[:1], few[:1] > 0),)
-    trial = Trial(table[0], True, value, table, table, episodes, table[:1].astype(np.float32))
+    row = table[:1].astype(np.float32)
+    trial = Trial(table[0], True, value, table, table, episodes, few, row, row)
     return [(f"{b}/{k}", trial) for k in range(50)]
 
 store = Store(sys.argv[1])
@@ -73,7 +74,9 @@ def trial(
             )
             for n in lengths
         ),
+        collisions=largest - np.arange(len(lengths) - 1),
         values=np.resize(table, (len(lengths), 2)).astype(np.float32),
+        rewards=np.resize(-table, (len(lengths), 2)).astype(np.float32),
         snapshots=snapshots,
     )
 
@@ -82,9 +85,8 @@ def assert_same(one: Trial, other: Trial) -> None:
     """Assert that two trials have the same bits, shapes and types."""
     assert (one.converged, one.steps) == (other.converged, other.steps)
     assert (type(one.converged), type(one.steps)) == (bool, int)
-    pairs = [
-        (getattr(one, name), getattr(other, name)) for name in ("errors", "weights", "q", "values")
-    ]
+    names = "errors", "weights", "q", "collisions", "values", "rewards"
+    pairs = [(getattr(one, name), getattr(other, name)) for name in names]
     for mine, due in zip(one.episodes, other.episodes, strict=True):
         pairs += zip(mine, due, strict=True)
     assert (one.snapshots is None) == (other.snapshots is None)
