@@ -229,7 +229,7 @@ def test_a_single_cell_is_its_verdict() -> None:
 
 def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
     """Each claim that was predicted has a row; one whose number was used up has none."""
-    ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-UNIFIED-OPEN"}
+    ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-ADABOOST-OPEN"}
     judged = JUDGED[JUDGED["id"].isin([*ids])].replace({"id": ids})
     assert shown(readable_predictions(judged)) == [
         f"{ids[id]} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
@@ -260,13 +260,15 @@ def test_readable_outcomes_by_hand() -> None:
     """Each claim and group has its counts and the range of its effects."""
     outcomes = table(
         "claim group specifications holds open reversed undefined with_caps uncapped "
-        "holds_uncapped unchanged median lowest highest",
-        ("FASTER", "single", 44, 40, 3, 1, 0, 0, 44, 40, 5, -4.0, -9.0, 1.0),
-        ("FASTER", "factorial", 240, 200, 30, 9, 1, 7, 232, 194, 0, -3.456, -20.0, 2.5),
+        "holds_uncapped unchanged median lowest highest p_median p_holds alone",
+        ("FASTER", "single", 44, 40, 3, 1, 0, 0, 44, 40, 5, 4.0, -1.0, 9.0, 0.0002, 0.041, 12),
+        ("FASTER", "factorial", 240, 20, 30, 9, 1, 7, 32, 19, 0, 3.456, -2.5, 9.0, NAN, NAN, 0),
     )
     assert shown(readable_outcomes(outcomes)) == [
-        "FASTER | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | -4.00 (-9.00, 1.00)",
-        "FASTER | all at once | 240 | 200 | 30 | 9 | 1 | 7 | 194 of 232 | 0 | -3.46 (-20.00, 2.50)",
+        "FASTER | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | 12 | < 0.001, 0.041 | "
+        "4.00 (-1.00, 9.00)",
+        "FASTER | all at once | 240 | 20 | 30 | 9 | 1 | 7 | 19 of 32 | 0 | – | –, – | "
+        "3.46 (-2.50, 9.00)",
     ]
 
 
