@@ -222,6 +222,15 @@ def test_a_sentence_has_the_verdict_of_every_cell(id: str) -> None:
     assert sentence(JUDGED[JUDGED["id"] == id]) == SENTENCES[id]
 
 
+def test_a_run_that_is_not_testable_in_a_cell_has_no_probability_there() -> None:
+    """Single runs have a probability for each cell, in order, or the reason why there is none."""
+    runs = JUDGED[JUDGED["id"] == "E"].copy()
+    runs.iloc[1, runs.columns.get_indexer(["verdict", "p"])] = NOT_TESTABLE, NAN
+    assert sentence(runs) == "p = 0.250, not testable"
+    runs["verdict"] = NOT_TESTABLE
+    assert sentence(runs) == "not testable: single"
+
+
 def test_a_single_cell_is_its_verdict() -> None:
     """A claim with one cell is not said to hold in every one."""
     assert sentence(JUDGED.head(1)) == "shown"
@@ -238,12 +247,17 @@ def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
 
 
 def test_verdict_lines_have_the_claim_and_its_sentence() -> None:
-    """On a terminal there is a line a claim: what it says, and its verdicts, lined up."""
+    """On a terminal each claim has its verdicts beside it, in lines of at most 100 columns."""
     lines = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
-    width = len("steadier than AdaBoost-IRL")
-    for line, (id, said) in zip(lines, SENTENCES.items(), strict=True):
-        name = "steadier than AdaBoost-IRL" if id == "B" else id
-        assert line == f"{name:<{width}}  {said}"
+    width = len("steadier than AdaBoost-IRL") + 2
+    assert all(len(line) <= 100 for line in lines)
+    said: dict[str, list[str]] = {}
+    for line in lines:  # a long sentence goes on below itself
+        name = line[:width].rstrip() or list(said)[-1]
+        said.setdefault(name, []).append(line[width:])
+    found = [" ".join(parts) for parts in said.values()]
+    assert found == list(SENTENCES.values())
+    assert list(said) == ["steadier than AdaBoost-IRL" if id == "B" else id for id in SENTENCES]
 
 
 def test_verdicts_read_the_same_from_a_file(tmp_path: Path) -> None:
