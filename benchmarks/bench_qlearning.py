@@ -30,9 +30,10 @@ from replication.learning.seeds import stream
 from replication.trials.condition import Condition
 
 Array = NDArray[Any]
-Learner = Callable[..., tuple[Array, Array, int]]
+Learned = tuple[Array, Array, int, int]
+Learner = Callable[..., Learned]
 
-RATES: dict[str, Any] = {"beta": 0.7, "gamma": 0.9, "epsilon": 0.1}
+RATES: dict[str, Any] = {"beta": 0.7, "gamma": 0.9, "epsilon": 0.1, "tolerance": 1e-12}
 ROUNDS = 5
 
 
@@ -41,7 +42,7 @@ class Task(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("states", "start", "goal", "episodes", "horizon")),
-        *((name, ctypes.c_double) for name in ("beta", "gamma")),
+        *((name, ctypes.c_double) for name in ("beta", "gamma", "tolerance")),
         ("threshold", ctypes.c_uint64),
         ("random_ties", ctypes.c_int64),
     )
@@ -62,8 +63,8 @@ def c_learn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Learner]:
 
     def learn(
         next_state: Array, weights: Array, q: Array, stream: Array, **options: Any
-    ) -> tuple[Array, Array, int]:
-        q, stream = q.copy(), stream.copy()
+    ) -> Learned:
+        q, stream, collisions = q.copy(), stream.copy(), ctypes.c_int64()
         task = Task(
             states=len(next_state),
             threshold=round(options.pop("epsilon") * 2**32),
@@ -71,25 +72,28 @@ def c_learn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Learner]:
             **options,
         )
         arrays = [x.ctypes.data_as(ctypes.c_void_p) for x in (next_state, weights, q, stream)]
-        return q, stream, function(ctypes.byref(task), *arrays)
+        steps = function(ctypes.byref(task), *arrays, ctypes.byref(collisions))
+        return q, stream, steps, collisions.value
 
     return {"C": learn}
 
 
-def reference_learn(*arrays: Array, **options: Any) -> tuple[Array, Array, int]:
+def reference_learn(*arrays: Array, **options: Any) -> Learned:
     """Learn by the reference."""
-    q, stream, steps = reference.learn(*(array.tolist() for array in arrays), **options)
-    return np.array(q), np.array(stream, np.uint64), steps
+    lists = (array.tolist() for array in arrays)
+    q, stream, steps, collisions = reference.learn(*lists, **options)
+    return np.array(q), np.array(stream, np.uint64), steps, collisions
 
 
 def python_learn(
     next_state: Array, weights: Array, q: Array, stream: Array, **options: Any
-) -> tuple[Array, Array, int]:
+) -> Learned:
     """Learn by a loop on lists that draws ahead and carries the best value along."""
     successors, rewards, table = (x.tolist() for x in (next_state, weights, q))
     beta, gamma, epsilon = options["beta"], options["gamma"], options["epsilon"]
     start, goal, horizon = options["start"], options["goal"], options["horizon"]
-    rng, width, steps = np.random.default_rng(stream), len(table[0]), 0
+    tolerance, actions = options["tolerance"], range(len(table[0]))
+    rng, width, steps, collisions = np.random.default_rng(stream), len(table[0]), 0, 0
 
     def numbers() -> Iterator[float]:
         while True:
@@ -102,10 +106,10 @@ def python_learn(
         for _ in range(horizon):
             if number() < epsilon:
                 action = int(number() * width)
-            elif (ties := row.count(best)) == 1:
-                action = row.index(best)
             else:
-                action = [a for a in range(width) if row[a] == best][int(number() * ties)]
+                least = best - tolerance * abs(best)
+                tied = [a for a in actions if row[a] >= least]
+                action = tied[0] if len(tied) == 1 else tied[int(number() * len(tied))]
             steps += 1
             successor = successors[state][action]
             if successor == goal:
@@ -115,9 +119,10 @@ def python_learn(
             best = max(after)
             row[action] += beta * (rewards[state][action] + gamma * best - row[action])
             if successor == state:
+                collisions += 1
                 best = max(row)
             state, row = successor, after
-    return np.array(table), stream, steps
+    return np.array(table), stream, steps, collisions
 
 
 def show(title: str, speeds: dict[str, list[float]]) -> None:
@@ -184,10 +189,10 @@ def test_speed(c_learn: dict[str, Learner], kind: str, size: int) -> None:
     """Learner, C and reference compute the same bits; their speeds are shown, by size of maze."""
     arrays, options = make_load(kind, size)
     learners: dict[str, Learner] = {"ours": qlearning.learn, **c_learn}
-    bits = {
-        name: [array.tobytes() for array in learner(*arrays, episodes=50, **options)[:2]]
-        for name, learner in (learners | {"reference": reference_learn}).items()
-    }
+    bits = {}
+    for name, learner in (learners | {"reference": reference_learn}).items():
+        q, after, *counts = learner(*arrays, episodes=50, **options)
+        bits[name] = q.tobytes(), after.tobytes(), counts
     assert all(x == bits["reference"] for x in bits.values())
     slow: dict[str, Learner] = {"Python": python_learn, "reference": reference_learn}
     episodes = dict.fromkeys(learners, 20_000) | dict.fromkeys(slow, 50)
@@ -212,14 +217,13 @@ class With:
         """Number of states and number of actions."""
         return self.agent.shape
 
-    def learn(self, weights: Array, q: Array, stream: Array) -> tuple[Array, Array, int]:
+    def learn(self, weights: Array, q: Array, stream: Array) -> Learned:
         """Learn in the agent's maze."""
         maze, learner = self.agent.maze, self.agent.learner
         names = "episodes", "horizon", "beta", "gamma", "epsilon"
         options = {name: getattr(learner, name) for name in names}
-        return self.learner(
-            maze.next_state, weights, q, stream, start=maze.start, goal=maze.goal, **options
-        )
+        options |= {"tolerance": learner.tie_tolerance, "start": maze.start, "goal": maze.goal}
+        return self.learner(maze.next_state, weights, q, stream, **options)
 
     def roll_out(self, q: Array, stream: Array) -> tuple[Episode, Array]:
         """Follow the greedy policy as the agent does."""
