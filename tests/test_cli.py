@@ -136,12 +136,12 @@ def test_tables_are_shown_by_their_names(project: Path) -> None:
 def test_claims_are_shown_last(
     project: Path, monkeypatch: pytest.MonkeyPatch, out: str | None
 ) -> None:
-    """A run that judges the claims ends with a line for each of them, the verdict first."""
+    """A run that judges the claims ends with the verdicts on each of them."""
     table = (
-        "id,claim,place,statistic,reading,paper,effect,low,high,verdict,why\n"
-        "FASTER,It is faster,Table I,mean-difference,printed,-5,-4,-6,-2,reproduced,\n"
-        "FASTER,It is faster,Table I,mean-difference,updated,-5,-1,-2,0,undecided,why\n"
-        "SD-B,SD,Fig. 6,published-sd,,3,2,1,3,not testable,used\n"
+        "id,claim,place,statistic,reading,set,paper,effect,low,high,p,verdict,why\n"
+        "FASTER,It is faster,Table I,saved,printed,none,5,4,2,6,0,shown,\n"
+        "FASTER,It is faster,Table I,saved,updated,none,5,1,0,2,0,inconclusive,\n"
+        "SD-B,SD,Fig. 6,published-sd,,none,3,2,1,3,,not testable,used\n"
     )
     code = (
         "from pathlib import Path\nfolder = Path(out)\n"
@@ -153,10 +153,11 @@ def test_claims_are_shown_last(
     shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
     assert "long table" not in shown
     assert shown.index("outputs (3 new)") < shown.index("The paper's claims:")
-    lines = [line.split() for line in shown.splitlines()[-4:]]
-    assert " ".join(lines[0]) == "The paper's claims:"
-    assert [line[0] for line in lines[1:]] == ["verdict", "partly", "not"]
-    assert [line[-1] for line in lines[1:]] == ["claim", "AdaBoost-IRL", "SD-B"]
+    assert shown.splitlines()[-3:] == [
+        "The paper's claims:",
+        "faster than AdaBoost-IRL  shown under Fᵢ (printed), inconclusive under Fᵢ₊₁ (updated)",
+        "SD-B                      not testable: used",
+    ]
 
 
 def test_failing_cell_shows_its_traceback(kernel: Path) -> None:
@@ -279,7 +280,7 @@ def test_check_answers_by_its_exit_code(project: Path) -> None:
     ("module", "old", "new", "message"),
     [
         (claims, 'statistic = "sd-ratio"', 'statistic = "sd-rato"', "claim STEADIER.statistic"),
-        (claims, "soccer = 60", "soccer = 0", "judging.trials.soccer: Input should be greater"),
+        (claims, "soccer = 100", "soccer = 0", "judging.trials.soccer: Input should be greater"),
         (specifications, "trials = 10", "trials = 0", "mazes.factorial.trials: Input should be"),
         (specifications, '["hit", "detour", "op', '["lob", "detour", "op', "soccer.single: "),
         (specifications, '"far-detour", "opposite"', '"overspeed"', "mazes.single: task open-maze"),

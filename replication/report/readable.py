@@ -5,6 +5,7 @@ One file because all tables share their labels and the way in which numbers are 
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -199,10 +200,12 @@ def sentence(part: pd.DataFrame) -> str:
 
     `part` has the rows of one claim in a table of verdicts.
     """
+    testable = part["verdict"] != NOT_TESTABLE
+    if part["statistic"].iloc[0] == "published-run" and testable.any():
+        cells = zip(testable, part["p"], strict=True)
+        return ", ".join(p_is(p) if known else NOT_TESTABLE for known, p in cells)
     if part["verdict"].nunique() == 1:
         verdict = str(part["verdict"].iloc[0])
-        if part["statistic"].iloc[0] == "published-run":
-            return _probabilities(part)
         if verdict == NOT_TESTABLE:
             return f"{verdict}: {part['why'].iloc[0]}"
         return f"{verdict} in every cell" if len(part) > 1 else verdict
@@ -211,10 +214,6 @@ def sentence(part: pd.DataFrame) -> str:
     if len(texts) == 1:
         return texts[0]
     return "; ".join(f"{name}: {text}" for name, text in zip(names, texts, strict=True))
-
-
-def _probabilities(part: pd.DataFrame) -> str:
-    return ", ".join(p_is(p) for p in part["p"])
 
 
 def _of_set(rows: pd.DataFrame) -> str:
@@ -238,13 +237,19 @@ def readable_predictions(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+TERMINAL = 100
+"""Columns that a line for a terminal may have."""
+
+
 def verdict_lines(table: pd.DataFrame) -> list[str]:
     """Return judged claims for a terminal: what each says, and its verdicts in one sentence."""
-    width = max(len(LABELS.get(id, id)) for id in table["id"].unique())
-    return [
-        f"{LABELS.get(str(id), str(id)):<{width}}  {sentence(part)}"
-        for id, part in table.groupby("id", sort=False)
-    ]
+    names = [LABELS.get(id, id) for id in table["id"].unique()]
+    width = max(map(len, names)) + 2
+    lines = []
+    for name, (_, part) in zip(names, table.groupby("id", sort=False), strict=True):
+        first, *rest = textwrap.wrap(sentence(part), TERMINAL - width)
+        lines += [name.ljust(width) + first, *(" " * width + line for line in rest)]
+    return lines
 
 
 # --- specifications --------------------------------------------------------------------------

@@ -14,10 +14,16 @@ import pandas as pd
 import yaml
 
 from replication.evidence.claims import evidence
-from replication.evidence.experiments import NAMED
+from replication.evidence.experiments import NAMED, NONE
 from replication.irl import READINGS
 from replication.paper.register import Choice, load_choices
-from replication.report.readable import SET_LABELS, markdown, readable_verdicts, sentence
+from replication.report.readable import (
+    F_LABELS,
+    SET_LABELS,
+    markdown,
+    readable_verdicts,
+    sentence,
+)
 from replication.site.pages import anchor
 
 WIDTH, MARGIN, LINE = 190, 6, 10
@@ -127,14 +133,17 @@ def _mark(shape: str, kind: str, **places: object) -> str:
 
 
 def _in_words(part: pd.DataFrame) -> str:
-    first = part.iloc[0]
-    effects = "; ".join(
-        f"{row.reading or READINGS[0]} F, {SET_LABELS[row.set]}: {row.effect:.3g} from "
-        f"{row.low:.3g} to {row.high:.3g}"
-        for row in part.itertuples()
-    )
-    paper = "" if math.isnan(first["paper"]) else f" Paper: {first['paper']:.3g}."
-    return f"{effects}. Margin: {part['margin'].max():.3g}.{paper}"
+    paper, margin = float(part["paper"].iloc[0]), float(part["margin"].max())
+    cells = []
+    for row in part.itertuples():
+        cell = F_LABELS[row.reading or READINGS[0]]
+        cell += "" if row.set == NONE else f", {SET_LABELS[row.set]}"
+        known = f"{row.effect:.3g} from {row.low:.3g} to {row.high:.3g}"
+        cells.append(f"{cell}: {'no number' if math.isnan(row.effect) else known}")
+    sentences = ["; ".join(cells)]
+    sentences += [] if math.isnan(margin) else [f"Margin: {margin:.3g}"]
+    sentences += [] if math.isnan(paper) else [f"Paper: {paper:.3g}"]
+    return ". ".join(sentences) + "."
 
 
 # --- choices and citation --------------------------------------------------------------------

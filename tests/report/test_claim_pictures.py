@@ -32,7 +32,7 @@ from replication.irl import READINGS
 from replication.report import calibration, sensitivity, specification_curve, verdicts
 from replication.report.drawing import OUTCOMES, UNITS
 from replication.report.picture import Picture
-from replication.report.readable import sentence
+from replication.report.readable import F_LABELS, sentence
 from replication.report.style import save_figure
 from tests.report.legible import assert_legible
 
@@ -405,6 +405,23 @@ def test_no_ring_is_explained_where_there_is_none() -> None:
     for table, count in ((POINTS, 1), (POINTS.assign(default=False), 0)):
         (legend,) = drawn(calibration.points(table)).legends
         assert [text.get_text() for text in legend.get_texts()].count("default") == count
+
+
+def test_finalists_are_a_table_too() -> None:
+    """Each finalist has a row: its choices, both numbers with intervals, and what it is."""
+    readable = calibration.readable_final(POINTS)
+    assert readable.columns.tolist() == [
+        *("F-INDEX", *WORLD, *TRACE, "Mean [95 %]", "SD [95 %]", "Divergence", "Fits", "Default")
+    ]
+    row = POINTS.iloc[3]
+    assert readable.iloc[3].tolist() == [
+        *(F_LABELS[row["F-INDEX"]], *row[[*WORLD, *TRACE]]),
+        f"{row['mean']:.2f} [{row['low']:.2f}, {row['high']:.2f}]",
+        f"{row['sd']:.2f} [{row['sd_low']:.2f}, {row['sd_high']:.2f}]",
+        *("0.300", "yes", ""),
+    ]
+    assert readable["Fits"].tolist() == ["yes"] * 5 + ["no"] * 35
+    assert readable["Default"].tolist() == ["yes"] * 2 + [""] * 38
 
 
 # --- what the claims depend on ---------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from replication.evidence.calibration import PLAINEST, TRACE, WORLD, chosen, points
 from replication.evidence.claims import criteria_hash, load_claims
 from replication.evidence.rounding import settings, variants
-from replication.evidence.sensitivity import HOLDS, OPEN, REVERSED, UNDEFINED
+from replication.evidence.sensitivity import HOLDS, JOINT, OPEN, REVERSED, UNDEFINED
 from replication.evidence.specifications import Specification, load_specifications
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
@@ -21,9 +21,10 @@ from replication.report.findings import (
     caveats,
     chance,
     dependence,
+    holding,
     one_at_a_time,
-    rechecked,
     rounded,
+    shows_opposite,
 )
 from replication.report.readable import F_LABELS
 
@@ -91,82 +92,56 @@ def test_no_tolerance_may_do() -> None:
 COLUMNS = [*WORLD, *TRACE, "F-INDEX"]
 
 
-def made_up(*, least: int = 0) -> pd.DataFrame:
-    """Make up finalists of two worlds, the nearest first; the first world is that of the default.
+def made_up(*, fitting: int) -> pd.DataFrame:
+    """Make up finalists of two worlds, the nearest first, of which some fit.
 
-    `least` is the first of them that does not fit.
+    The first world is that of the default, with the default of each trace.
     """
     default = [chosen(trace) for trace in TRACES]
-    world = default[0][:3]
-    other = next(point[:3] for point in points() if point[:3] != world)
+    other = next(point[:3] for point in points() if point[:3] != default[0][:3])
     rest = [(*other, *point[3:]) for point in default]
-    table = pd.DataFrame([*default, *rest], columns=COLUMNS)
-    order = np.arange(len(table))
-    return table.assign(
-        n=200, mean=40 + order, sd=5.0, kl_divergence=order / 10, fits=order < least
+    order = np.arange(4)
+    return (
+        pd.DataFrame([*default, *rest], columns=[*WORLD, *TRACE, "F-INDEX"])
+        .assign(n=200, mean=40 + order, sd=5.0, kl_divergence=order / 10, fits=order < fitting)
+        .assign(paper_mean=40.10, paper_sd=4.73)
     )
 
 
-def test_what_the_rule_takes_is_named() -> None:
-    """The number of points, those that fit, and the point of each trace with its numbers."""
-    final = made_up(least=3)
-    text = calibrated(pd.DataFrame(index=range(240)), final)
-    assert text.startswith("Of 240 points 4 went on to the second stage; 3 of them fit")
-    for trace, mean in zip(TRACES, (40, 41), strict=True):
+def taken(text: str) -> list[str]:
+    """Return the values that the text says the rule takes for each trace."""
+    _, _, rest = text.partition("The rule takes ")
+    return rest.partition(". These")[0].split("; ")
+
+
+@pytest.mark.parametrize(
+    ("fitting", "words"), [(3, "**3 of them** fit"), (1, "**1 of them** fits")]
+)
+def test_what_the_rule_takes_is_named(fitting: int, words: str) -> None:
+    """The number of points, those that fit, the nearest one's numbers, and each trace's point."""
+    text = calibrated(pd.DataFrame(index=range(240)), made_up(fitting=fitting))
+    assert text.startswith(f"Of 240 points 4 went on to the second stage, and {words} the pair.")
+    assert "mean of 40.00 (SD 5.00) in 200 trials; the paper has 40.10 (4.73)." in text
+    for trace, said in zip(TRACES, taken(text), strict=True):
         values = zip((*WORLD, *TRACE), chosen(trace), strict=False)
         named = ", ".join(f"{id} = {value}" for id, value in values)
-        numbers = f"with a mean of {mean:.2f} (SD 5.00) in 200 trials: it fits"
-        assert f"Under {F_LABELS[trace]} the rule takes {named}, {numbers}." in text
-    assert text.endswith("They are our defaults.")
+        assert said == f"under {F_LABELS[trace]}: {named}"
+    assert text.endswith("These are our defaults.")
 
 
 def test_another_nearest_point_is_not_said_to_be_the_default() -> None:
     """If the nearest world is another, the text says that it is not ours."""
-    final = made_up(least=4)
+    final = made_up(fitting=4)
     final["kl_divergence"] = final["kl_divergence"].to_numpy()[::-1]
-    assert calibrated(final, final).endswith("They are NOT our defaults.")
-
-
-def test_a_trace_whose_nearest_point_does_not_fit_is_told() -> None:
-    """Where one trace fits and the other does not, both are said."""
-    text = calibrated(made_up(), made_up(least=1))
-    assert text.count(": it fits.") == 1
-    assert text.count(": it does not fit.") == 1
+    assert calibrated(final, final).endswith("These are NOT our defaults.")
 
 
 def test_without_a_fit_the_plainest_point_is_taken() -> None:
-    """If nothing fits, the rule takes the middle of each range, with no number beside it."""
-    text = calibrated(made_up(), made_up())
-    assert "0 of them fit" in text
+    """If nothing fits, the text says so, and that the rule takes the middle of each range."""
+    text = calibrated(made_up(fitting=0), made_up(fitting=0))
+    assert "**none of them** fits the pair" in text
     named = ", ".join(f"{id} = {v}" for id, v in zip((*WORLD, *TRACE), PLAINEST, strict=True))
-    for trace in TRACES:
-        assert f"Under {F_LABELS[trace]} the rule takes {named}." in text
-
-
-@pytest.mark.parametrize(
-    ("mean", "sd", "text"),
-    [
-        (40.0, 4.7, "the mean is where the published distribution predicts it, the SD is."),
-        (40.0, 9.4, "the mean is where the published distribution predicts it, the SD is not."),
-        (43.0, 4.7, "the mean is not where the published distribution predicts it, the SD is."),
-        (37.0, 9.4, "the mean is not where the published distribution predicts it, the SD is not."),
-    ],
-)
-def test_new_trials_are_held_against_the_prediction(mean: float, sd: float, text: str) -> None:
-    """Mean and SD of each trace's judging trials are held against where they would lie."""
-    check = pd.DataFrame(
-        {"n": [200, 1000, 200, 1000], "trials": ["calibration", "judging"] * 2}
-        | {"reading": ["printed"] * 2 + ["updated"] * 2}
-        | {"mean": [40.0, mean, 40.0, 33.0], "sd": [5.0, sd, 5.0, 6.0]}
-        | {"predicted_low": 38.8, "predicted_high": 41.4}
-        | {"sd_predicted_low": 3.9, "sd_predicted_high": 5.7}
-    )
-    first, second = rechecked(check).split(" Under ")
-    assert first == (
-        f"Under Fᵢ (printed) the judging run has a mean of {mean:.2f} (SD {sd:.2f}) in 1000 "
-        f"trials: {text}"
-    )
-    assert second.startswith("Fᵢ₊₁ (updated) the judging run has a mean of 33.00 (SD 6.00)")
+    assert taken(text) == [f"under {F_LABELS[trace]}: {named}" for trace in TRACES]
 
 
 # --- specifications --------------------------------------------------------------------------
@@ -183,6 +158,7 @@ def ruled(claim: str, statistic: str, by_rule: dict[str, float]) -> pd.DataFrame
         | {"specification": [one.name for one in made], "n": 10, "capped_x": 0}
         | {"capped": [10 if rule == "graded" else 0 for rule, _ in values]}
         | {"effect": effect, "low": effect - 0.5, "high": effect + 0.5, "outcome": outcome}
+        | dict.fromkeys(JOINT, np.nan)
     )
 
 
@@ -280,3 +256,61 @@ def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
     held = table[table["outcome"] == HOLDS]["capped"].eq(10)
     few, most = sorted((held.sum() / 40, (~held).sum() / 40))
     assert f"with its 2 values in {few:.0%} to {most:.0%} of the specifications" in chance(table)
+
+
+# --- beside the verdicts ---------------------------------------------------------------------
+
+
+def held(claim: str, *specifications: tuple[str, str, int]) -> pd.DataFrame:
+    """Make up effects of the factorial: specification, outcome and trials at the cap."""
+    return pd.DataFrame(specifications, columns=["specification", "outcome", "capped"]).assign(
+        claim=claim, group="factorial"
+    )
+
+
+EFFECTS = pd.concat(
+    [
+        held(
+            "SAVES-OPEN",
+            ("MAP=open INCORRECT-KINDS=hit", OPEN, 0),
+            ("MAP=open INCORRECT-KINDS=hit+detour", HOLDS, 1),
+            ("MAP=open INCORRECT-KINDS=all", HOLDS, 0),
+            ("MAP=open INCORRECT-KINDS=hit+detour+opposite", HOLDS, 0),
+            ("MAP=open INCORRECT-KINDS=opposite", REVERSED, 0),
+            ("MAP=obstacles INCORRECT-KINDS=opposite", HOLDS, 0),
+            ("MAP=random-1 INCORRECT-KINDS=opposite", OPEN, 0),
+        ),
+        held(
+            "FASTER",
+            ("MAP=open INCORRECT-KINDS=all", HOLDS, 0),
+            ("MAP=open INCORRECT-KINDS=hit", UNDEFINED, 0),
+            ("MAP=open INCORRECT-KINDS=hit", OPEN, 2),
+        ),
+        held("SAVES-SOCCER", ("default", OPEN, 0), ("ALPHA=0.9", HOLDS, 0)).assign(group="single"),
+    ]
+)
+
+
+@pytest.mark.parametrize(
+    ("id", "text"),
+    [
+        (
+            "SAVES-OPEN",
+            "with moves in the opposite direction 2 of 3; without 1 of 2 (uncapped 0 of 1)",
+        ),
+        ("SAVES-OBSTACLES", "with moves in the opposite direction 1 of 1; without 0 of 0"),
+        ("FASTER", "1 of 2 (uncapped 1 of 1)"),
+        ("SAVES-SOCCER", "1 of 2"),
+        ("Q-GROWS", "–"),
+    ],
+)
+def test_specifications_in_which_a_claim_holds_are_counted(id: str, text: str) -> None:
+    """A claim is counted on its own map, apart for whether the opposite direction is shown."""
+    assert holding(EFFECTS, id) == text
+
+
+def test_the_opposite_direction_is_in_a_set_or_not() -> None:
+    """All kinds together have it, and so does a set that names it."""
+    sets = ["all", "opposite", "hit+detour+opposite", "hit", "hit+near-detour"]
+    found = [shows_opposite({"INCORRECT-KINDS": name}) for name in sets]
+    assert found == [True, True, True, False, False]

@@ -222,6 +222,15 @@ def test_a_sentence_has_the_verdict_of_every_cell(id: str) -> None:
     assert sentence(JUDGED[JUDGED["id"] == id]) == SENTENCES[id]
 
 
+def test_a_run_that_is_not_testable_in_a_cell_has_no_probability_there() -> None:
+    """Single runs have a probability for each cell, in order, or the reason why there is none."""
+    runs = JUDGED[JUDGED["id"] == "E"].copy()
+    runs.iloc[1, runs.columns.get_indexer(["verdict", "p"])] = NOT_TESTABLE, NAN
+    assert sentence(runs) == "p = 0.250, not testable"
+    runs["verdict"] = NOT_TESTABLE
+    assert sentence(runs) == "not testable: single"
+
+
 def test_a_single_cell_is_its_verdict() -> None:
     """A claim with one cell is not said to hold in every one."""
     assert sentence(JUDGED.head(1)) == "shown"
@@ -229,7 +238,7 @@ def test_a_single_cell_is_its_verdict() -> None:
 
 def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
     """Each claim that was predicted has a row; one whose number was used up has none."""
-    ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-UNIFIED-OPEN"}
+    ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-ADABOOST-OPEN"}
     judged = JUDGED[JUDGED["id"].isin([*ids])].replace({"id": ids})
     assert shown(readable_predictions(judged)) == [
         f"{ids[id]} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
@@ -238,12 +247,17 @@ def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
 
 
 def test_verdict_lines_have_the_claim_and_its_sentence() -> None:
-    """On a terminal there is a line a claim: what it says, and its verdicts, lined up."""
+    """On a terminal each claim has its verdicts beside it, in lines of at most 100 columns."""
     lines = verdict_lines(JUDGED.replace({"id": {"B": "STEADIER"}}))
-    width = len("steadier than AdaBoost-IRL")
-    for line, (id, said) in zip(lines, SENTENCES.items(), strict=True):
-        name = "steadier than AdaBoost-IRL" if id == "B" else id
-        assert line == f"{name:<{width}}  {said}"
+    width = len("steadier than AdaBoost-IRL") + 2
+    assert all(len(line) <= 100 for line in lines)
+    said: dict[str, list[str]] = {}
+    for line in lines:  # a long sentence goes on below itself
+        name = line[:width].rstrip() or list(said)[-1]
+        said.setdefault(name, []).append(line[width:])
+    found = [" ".join(parts) for parts in said.values()]
+    assert found == list(SENTENCES.values())
+    assert list(said) == ["steadier than AdaBoost-IRL" if id == "B" else id for id in SENTENCES]
 
 
 def test_verdicts_read_the_same_from_a_file(tmp_path: Path) -> None:
@@ -260,13 +274,15 @@ def test_readable_outcomes_by_hand() -> None:
     """Each claim and group has its counts and the range of its effects."""
     outcomes = table(
         "claim group specifications holds open reversed undefined with_caps uncapped "
-        "holds_uncapped unchanged median lowest highest",
-        ("FASTER", "single", 44, 40, 3, 1, 0, 0, 44, 40, 5, -4.0, -9.0, 1.0),
-        ("FASTER", "factorial", 240, 200, 30, 9, 1, 7, 232, 194, 0, -3.456, -20.0, 2.5),
+        "holds_uncapped unchanged median lowest highest p_median p_holds alone",
+        ("FASTER", "single", 44, 40, 3, 1, 0, 0, 44, 40, 5, 4.0, -1.0, 9.0, 0.0002, 0.041, 12),
+        ("FASTER", "factorial", 240, 20, 30, 9, 1, 7, 32, 19, 0, 3.456, -2.5, 9.0, NAN, NAN, 0),
     )
     assert shown(readable_outcomes(outcomes)) == [
-        "FASTER | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | -4.00 (-9.00, 1.00)",
-        "FASTER | all at once | 240 | 200 | 30 | 9 | 1 | 7 | 194 of 232 | 0 | -3.46 (-20.00, 2.50)",
+        "FASTER | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | 12 | < 0.001, 0.041 | "
+        "4.00 (-1.00, 9.00)",
+        "FASTER | all at once | 240 | 20 | 30 | 9 | 1 | 7 | 19 of 32 | 0 | – | –, – | "
+        "3.46 (-2.50, 9.00)",
     ]
 
 

@@ -137,10 +137,12 @@ def test_readable_rounding_by_hand() -> None:
     keys = {"task": "open-maze", "method": "adaboost", "reading": "", "tolerance": 0.0, "sd": 4.126}
     double = {"arithmetic": "double", "mean": 44.0, "difference": 0.0, "equal": 1.0}
     fused = {"arithmetic": "fused", "mean": 45.5, "difference": 1.5, "equal": 0.125}
-    table = pd.DataFrame([keys | double, keys | fused]).assign(low=0.5, high=2.5, p_holm=0.0004)
+    table = pd.DataFrame([keys | double, keys | fused]).assign(
+        low=0.5, high=2.5, p_holm=0.0004, wrong=7.04
+    )
     readable = readable_rounding(table)
     assert readable.columns.tolist()[:3] == ["Task", "Method", "Tolerance"]
     assert [" | ".join(row) for row in readable.to_numpy()] == [
         "open maze | AdaBoost-IRL (R1) | 0 | 44.00 (4.13) | fused | 1.50 [0.50, 2.50] | 12% | "
-        "< 0.001"
+        "< 0.001 | 7.0"
     ]
