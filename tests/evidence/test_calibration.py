@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ from replication.trials.measures import factors
 COLUMNS = [*WORLD, *TRACE, "F-INDEX"]
 
 
-def table_of(divergences: dict[Point, float], fits: set[Point] = frozenset()) -> pd.DataFrame:
+def table_of(divergences: dict[Point, float], fits: Collection[Point] = ()) -> pd.DataFrame:
     """Make a table of one stage up: points with their divergences, the nearest first."""
     rows = [
         {**dict(zip(COLUMNS, point, strict=True)), "kl_divergence": d, "fits": point in fits}

@@ -401,8 +401,8 @@ def test_comments_explain_every_measure_statistic_and_verdict() -> None:
     for one in CLAIMS:
         for word in (one.measure, one.statistic):
             assert re.search(rf"^#   {word} ", head, flags=re.MULTILINE), word
-    for word in ("not testable", "absent", "shown", "reversed", "inconclusive"):
-        assert re.search(rf"^#   {word} ", head, flags=re.MULTILINE), word
+    for verdict in ("not testable", "absent", "shown", "reversed", "inconclusive"):
+        assert re.search(rf"^#   {verdict} ", head, flags=re.MULTILINE), verdict
 
 
 def test_published_verdicts_are_by_this_file() -> None:
