@@ -56,8 +56,8 @@ def why(
     )
     words = (
         f"After its first update the agent walks {len(np.unique(episode.states))} cells of the map "
-        f"in {len(episode.actions)} moves. Share of each kind in the discounted visits of wrong pairs: "
-        f"{taken}."
+        f"in {len(episode.actions)} moves. Share of each kind in the discounted visits of wrong "
+        f"pairs: {taken}."
     )
     return Picture(pd.concat(parts, ignore_index=True), draw_why, words)
 
