@@ -161,25 +161,26 @@ def sets_table(trials: pd.DataFrame, conditions: Mapping[Key, Condition]) -> pd.
 
 
 def kinds_table(trials: pd.DataFrame) -> pd.DataFrame:
-    """Return how often wrong trajectories take a pair of each kind of incorrect demonstration.
+    """Return how much of what goes wrong each kind of incorrect demonstration marks.
 
-    One row for each kind and reading of Eq. 9, over all trajectories that are not the expert's but
-    the first ones, which are random walks; methods that are not given incorrect demonstrations.
+    One row for each kind and reading of Eq. 9, over all wrong trajectories but the first ones,
+    which are random walks, of the method that is given no incorrect demonstrations. `share` is that
+    of the trajectories that take a pair of the kind, `weight` that of such pairs in the discounted
+    visits of wrong pairs, by which weights move.
     """
-    kinds = [name for name in trials if str(name).startswith("with_")]
+    kinds = [str(name).removeprefix("with_") for name in trials if str(name).startswith("with_")]
     own = trials[(trials["method"] == "unified") & (trials["converged"] == 1)]
     rows = []
     for reading, part in own.groupby("reading", sort=False):
         wrong = int((part["iterations"] - 1).sum())
-        for name in kinds:
-            taken = int(part[name].sum())
+        for kind in kinds:
             rows.append(
                 {
                     "reading": reading,
-                    "kind": str(name).removeprefix("with_"),
+                    "kind": kind,
                     "trajectories": wrong,
-                    "taken": taken,
-                    "share": taken / wrong if wrong else np.nan,
+                    "share": part[f"with_{kind}"].sum() / wrong,
+                    "weight": part[f"visits_{kind}"].sum() / part["wrong_visits"].sum(),
                 }
             )
     return pd.DataFrame(rows)

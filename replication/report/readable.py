@@ -152,12 +152,13 @@ def readable_sets(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def readable_kinds(table: pd.DataFrame) -> pd.DataFrame:
-    """Return how often wrong trajectories take a pair of each kind, a row for each kind."""
+    """Return how much of what goes wrong each kind marks, a row for each kind."""
     shown = table[["kind"]].drop_duplicates().rename(columns=str.capitalize).set_index("Kind")
     for reading, rows in table.groupby("reading", sort=False):
-        column = f"{F_LABELS[str(reading)]}, of {rows['trajectories'].iloc[0]}"
-        shares = [f"{share:.1%}" for share in rows["share"]]
-        shown = shown.join(pd.Series(shares, index=rows["kind"], name=column))
+        for name, text in (("share", "of trajectories"), ("weight", "of wrong visits")):
+            values = [f"{value:.1%}" for value in rows[name]]
+            column = f"{F_LABELS[str(reading)]}: {text}"
+            shown = shown.join(pd.Series(values, index=rows["kind"], name=column))
     return shown.reset_index()
 
 

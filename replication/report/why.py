@@ -28,7 +28,7 @@ SHOWN = "unified", "printed", NONE
 def why(
     kinds: pd.DataFrame, saved: pd.DataFrame, trials: Mapping[Key, Trial], demos: Demos
 ) -> Picture:
-    """Show a wrong trajectory, the kinds of pairs that such trajectories take, and what sets save.
+    """Show a wrong trajectory, what goes wrong by kind, and what sets save.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def why(
         saved[saved["set"].isin(ALONE)].assign(part="saved"),
     ]
     taken = "; ".join(
-        f"{row.kind}, {F_LABELS[row.reading]}: {row.share:.0%}" for row in kinds.itertuples()
+        f"{row.kind}, {F_LABELS[row.reading]}: {row.weight:.0%}" for row in kinds.itertuples()
     )
     words = (
         f"After its first update the agent walks {len(np.unique(episode.states))} cells of the map "
-        f"in {len(episode.actions)} moves. Wrong trajectories that take a pair of each kind: "
-        f"{taken}."
+        f"in {len(episode.actions)} moves. Share of each kind in the discounted visits of wrong "
+        f"pairs: {taken}."
     )
     return Picture(pd.concat(parts, ignore_index=True), draw_why, words)
 
@@ -89,12 +89,12 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
     for place, reading in zip(_places(readings), readings, strict=True):
         rows = kinds[kinds["reading"] == reading].set_index("kind").loc[names]
         _, colour = READING_MARKS[reading]
-        y, share = np.arange(len(names)) + place, 100 * rows["share"].to_numpy()
+        y, share = np.arange(len(names)) + place, 100 * rows["weight"].to_numpy()
         bars = taken.barh(y, share, height=0.8 / len(readings), color=colour, alpha=0.75)
-        taken.bar_label(bars, fmt="%.3g", padding=2, size=7)
+        taken.bar_label(bars, fmt="%.1f", padding=2, size=7)
     taken.margins(x=0.15)
     taken.set_yticks(range(len(names)), names)
-    taken.set_xlabel("wrong trajectories\nthat take such a pair (%)")
+    taken.set_xlabel("share of all wrong visits\n(discounted, %)")
 
     saved = numbers[numbers["part"] == "saved"]
     sets = [name for name in ALONE if name in set(saved["set"])]

@@ -100,7 +100,6 @@ def numbers(figures: Path) -> dict[str, Any]:
         "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
         "general_size": _consistency(compared[in_general]),
         "set_labels": SET_LABELS,
-        "sentence_of": lambda id: sentence(judged[judged["id"] == id]),
         "p": p_value,
         "depends": at_once(factorial),
         "chance": chance(factorial),

@@ -14,7 +14,7 @@ from replication.demos.model import Demos
 from replication.envs.soccer.field import SoccerField
 from replication.irl import Trial
 from replication.irl.agent import Episode
-from replication.irl.expectations import visited
+from replication.irl.expectations import feature_expectations, visited
 from replication.paper.published import FIGURE_12, TABLE_1
 from replication.paper.register import Chosen, choice
 from replication.trials.condition import Condition
@@ -70,12 +70,13 @@ def trial_row(
     """
     kinds = kind_pairs(condition.demos)
     shown = marked_pairs(condition.selected)
+    gamma = condition.params.learner.gamma
 
     def row(trial: Trial, k: int, seed: int) -> dict[str, Any]:
         return (
             factors(condition)
             | {"trial": k, "seed": seed}
-            | measure(trial, condition.demos, kinds, shown, report)
+            | measure(trial, condition.demos, kinds, shown, report, gamma=gamma)
             | {"steps": trial.steps, "digest": digest(trial)}
             | ({"errors": " ".join(f"{d:.10g}" for d in trial.errors)} if errors else {})
         )
@@ -117,6 +118,8 @@ def measure(
     kinds: Mapping[str, NDArray[np.bool_]],
     shown: NDArray[np.bool_],
     report: Report,
+    *,
+    gamma: float,
 ) -> dict[str, float]:
     """Return every measure of one trial, by name.
 
@@ -132,24 +135,35 @@ def measure(
         The pairs that those mark which the method was given, `[state, action]`.
     report
         How long the initial phase is (EARLY), and when mid-term is (FIG7-MIDTERM).
+    gamma
+        The discount of visits.
     """
     early = early_iterations(demos, report)
     middle = round(report.mid_term * trial.iterations)
     wrong = marked_pairs(demos)
     right = visited(demos.correct, shape=wrong.shape)
-    loops = trial.episodes[1:]  # the first one is a random walk
+    first, *later = (
+        feature_expectations(episode.states, episode.actions, gamma=gamma, shape=wrong.shape)
+        for episode in trial.episodes
+    )  # the first trajectory is a random walk
+    visits = np.array(later).reshape(-1, *wrong.shape)
     return {
         "iterations": trial.iterations,
         "converged": int(trial.converged),
         "early_collisions": int(trial.collisions[:early].sum()),
-        "early_errors": sum(_errors(episode, wrong) for episode in loops[:early]),
+        "early_errors": sum(_errors(episode, wrong) for episode in trial.episodes[1 : early + 1]),
         "q_growth": _growth(trial.values, middle),
         "reward_growth": _growth(trial.rewards, middle),
-        "wrong_pairs": sum(_taken(episode, ~right) for episode in loops),
-        "acted": sum(_taken(episode, shown) for episode in loops),
-        "acted_at_first": _taken(trial.episodes[0], shown),
+        "acted": int((visits[:, shown] > 0).sum()),
+        "acted_at_first": int((first[shown] > 0).sum()),
+        "wrong_pairs": int((visits[:, ~right] > 0).sum()),
+        "wrong_visits": round(float(visits[:, ~right].sum()), DIGITS),
         **{
-            f"with_{kind}": sum(_taken(episode, pairs) > 0 for episode in loops)
+            f"with_{kind}": int((visits[:, pairs] > 0).any(axis=1).sum())
+            for kind, pairs in kinds.items()
+        },
+        **{
+            f"visits_{kind}": round(float(visits[:, pairs].sum()), DIGITS)
             for kind, pairs in kinds.items()
         },
     }
@@ -168,13 +182,6 @@ def marked_pairs(demos: Demos) -> NDArray[np.bool_]:
     """Return the pairs that an incorrect demonstration shows and no correct one."""
     shape = demos.environment.n_states, demos.environment.n_actions
     return visited(demos.incorrect, shape=shape) & ~visited(demos.correct, shape=shape)
-
-
-def _taken(episode: Episode, pairs: NDArray[np.bool_]) -> int:
-    """Return how many of some pairs an episode takes, each counted once."""
-    seen = np.zeros_like(pairs)
-    seen[episode.states[:-1], episode.actions] = True
-    return int((seen & pairs).sum())
 
 
 def _errors(episode: Episode, wrong: NDArray[np.bool_]) -> int:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,40 +11,61 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from replication import Demos
-from replication.envs.maze import as_maze
+from replication.evidence import calibration
 from replication.evidence.calibration import (
-    CALIBRATED,
+    FINAL_SEED,
+    FINAL_TRIALS,
     PAIR,
-    ROOT,
-    TRIALS,
+    PLAINEST,
+    POINTS,
+    SCREEN_SEED,
+    SCREEN_TRIALS,
+    SETS,
+    TRACE,
+    WORLD,
+    WORLDS,
+    Point,
     calibration_table,
     check_table,
     chosen,
-    grid,
-    grid_conditions,
+    condition,
+    declared_condition,
+    finalists,
     kl_divergence,
-    plan,
+    nearest,
+    points,
+    rule_follows,
+    savings_table,
+    stages,
+    worlds,
 )
 from replication.evidence.claims import load_claims
-from replication.evidence.statistics import mean_prediction
-from replication.evidence.tables import read_table
-from replication.files import PROJECT
+from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, GENERAL, NAMED
+from replication.evidence.statistics import mean_prediction, sd_prediction
+from replication.irl.methods import TRACES
 from replication.paper.published import Published
 from replication.paper.register import load_choices
-from replication.trials.store import Store
-from replication.trials.table import computed_table
+from replication.trials.compute import trial_key
+from replication.trials.measures import factors
 
-FIGURES = PROJECT / "figures"
+COLUMNS = [*WORLD, *TRACE, "F-INDEX"]
 
 
-@pytest.fixture(scope="module")
-def stored() -> pd.DataFrame:
-    """Read the published grid."""
-    path = FIGURES / "calibration" / "grid.csv"
-    if not path.exists():
-        pytest.skip("figures/calibration is not published yet")
-    return read_table(path)
+def table_of(divergences: dict[Point, float], fits: Collection[Point] = ()) -> pd.DataFrame:
+    """Make a table of one stage up: points with their divergences, the nearest first."""
+    rows = [
+        {**dict(zip(COLUMNS, point, strict=True)), "kl_divergence": d, "fits": point in fits}
+        for point, d in divergences.items()
+    ]
+    return pd.DataFrame(rows).sort_values("kl_divergence", kind="stable", ignore_index=True)
+
+
+def world_points(world: tuple[Any, ...], trace: str) -> list[Point]:
+    """Return the points of a world under a trace, in the order of all points."""
+    return [point for point in points() if (point[:3], point[-1]) == (world, trace)]
+
+
+ALL_WORLDS = list(dict.fromkeys(point[:3] for point in points()))
 
 
 # --- the criterion ---------------------------------------------------------------------------
@@ -86,126 +109,342 @@ def test_kl_divergence_is_the_likelihood_of_the_published_sample() -> None:
         assert a - b == pytest.approx(other - one)
 
 
-# --- the grid --------------------------------------------------------------------------------
+# --- the points ------------------------------------------------------------------------------
 
 
-def test_grid_has_all_registered_values() -> None:
-    """The declared 120 points: every value of four choices, but for the ablation ALPHA = 0."""
-    points = grid()
-    assert len(points) == len(set(points)) == 120
-    for at, id in enumerate(CALIBRATED):
+def test_points_are_all_registered_values() -> None:
+    """Every value of five choices under both traces, but for the ablation ALPHA = 0."""
+    found = points()
+    assert len(found) == len(set(found)) == 5 * 2 * 2 * 4 * 3 * 2
+    for at, id in enumerate((*WORLD, *TRACE)):
         entry = load_choices()[id]
         values = {entry.default, *entry.alternatives} - ({0.0} if id == "ALPHA" else set())
-        assert {point[at] for point in points} == values
-    assert chosen() in points
-    assert all(load_choices()[id].rule.startswith("Calibrated") for id in CALIBRATED)
-    assert {id for id, one in load_choices().items() if one.rule.startswith("Calibrated")} == set(
-        CALIBRATED
+        assert {point[at] for point in found} == values
+    assert {point[-1] for point in found} == set(TRACES)
+    assert {(*PLAINEST, trace) for trace in TRACES} <= set(found)
+    calibrated = {id for id, one in load_choices().items() if one.rule.startswith("Calibrated")}
+    assert calibrated == {*WORLD, *TRACE}
+
+
+def test_points_do_not_depend_on_the_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new default changes no point's number, by which its trials are filed."""
+    before = list(points())
+    register = dict(load_choices())
+    for id in (*WORLD, *TRACE):
+        entry = register[id]
+        other, *others = [value for value in entry.alternatives if value != 0]
+        values = {"default": other, "alternatives": (entry.default, *others)}
+        register[id] = type(entry)(**{**vars(entry), **values})
+    monkeypatch.setattr(calibration, "load_choices", lambda: register)
+    assert points.__wrapped__() == before
+
+
+def test_chosen_points_are_the_defaults_of_each_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """F_i has the register's values, F_(i+1) its own ALPHA and F-START, in the same world."""
+    register = load_choices()
+    defaults = tuple(register[id].default for id in (*WORLD, *TRACE))
+    assert chosen("printed") == (*defaults, "printed")
+    monkeypatch.setattr(calibration, "CALIBRATED", {"updated": {"alpha": 0.9, "f_start": 0.1}})
+    assert chosen("updated") == (*defaults[:3], 0.9, 0.1, "updated")
+    assert chosen("printed") == (*defaults, "printed")
+
+
+def test_chosen_points_are_those_of_the_experiments() -> None:
+    """The conditions that are judged have the values that the calibration calls chosen."""
+    own = EXPERIMENTS["open-maze"].conditions()
+    for trace in TRACES:
+        ours, theirs = condition(chosen(trace)), own["unified", trace, "none"]
+        assert trial_key(ours, 1, 2) == trial_key(theirs, 1, 2)
+        assert set(CALIBRATED) <= {"updated"}
+
+
+def test_condition_of_a_point() -> None:
+    """It is the unified method on the open maze with the point's six values, all else default."""
+    for point in points()[::37]:
+        leg, ties, q_start, alpha, f_start, trace = point
+        for method, set in (("unified", "none"), ("unified-incorrect", GENERAL)):
+            made = condition(point, method, set)
+            changed = made.params.differences()
+            assert changed.keys() <= {*WORLD[1:], *TRACE, "F-INDEX", "INCORRECT-KINDS"}
+            learner, update = made.params.learner, made.params.update
+            assert (learner.ties, learner.q_start) == (ties, q_start)
+            assert (update.alpha, update.f_start, update.f_index) == (alpha, f_start, trace)
+            expected = {"task": "open-maze", "method": method, "reading": trace, "set": set}
+            assert factors(made) == expected
+            assert made.demos.correct == condition((leg, *chosen("printed")[1:])).demos.correct
+    assert len({condition(point).demos.correct for point in points()}) == 5
+
+
+# --- the first stage -------------------------------------------------------------------------
+
+
+def test_divergence_of_a_world_is_the_sum_over_traces() -> None:
+    """The least of each trace, added; a world that lacks a trace, or is out, comes last."""
+    a, b, c, d = ALL_WORLDS[:4]
+    divergences: dict[Point, float] = {}
+    for world, printed, updated in (
+        (a, (0.5, 0.1, 0.9), (0.3, 0.2)),  # 0.1 + 0.2
+        (b, (0.05,), (0.4, 0.15)),  # 0.05 + 0.15
+        (c, (0.01,), (np.inf, 0.6)),  # 0.01 + 0.6
+        (d, (0.001,), (np.inf,)),
+    ):
+        for trace, values in (("printed", printed), ("updated", updated)):
+            divergences |= dict(zip(world_points(world, trace), values, strict=False))
+    found = worlds(table_of(divergences))
+    assert list(found.index) == [b, a, c, d]
+    assert found.tolist() == pytest.approx([0.2, 0.3, 0.61, np.inf])
+    without = {point: value for point, value in divergences.items() if point[-1] == "printed"}
+    alone = worlds(table_of(without | {world_points(c, "updated")[0]: 2.0}))
+    assert alone.index[0] == c
+    assert alone.isna().sum() == 3
+
+
+def test_finalists_by_hand() -> None:
+    """The 5 nearest worlds, and of each the 4 nearest points under each trace, in this order."""
+    order = [7, 2, 11, 0, 16, 4, 9]  # of worlds, from the nearest
+    divergences: dict[Point, float] = {}
+    for rank, at in enumerate(order):
+        for trace in TRACES:
+            own = world_points(ALL_WORLDS[at], trace)
+            for place, point in enumerate(own):
+                # Within a world the nearest points are the 3rd, 4th, 5th, ...; the traces differ.
+                step = (place - 2 - (trace == "updated")) % len(own)
+                divergences[point] = 1.0 + rank**2 + 0.01 * step
+    # A single point that is nearer than any other does not bring its world in.
+    divergences[world_points(ALL_WORLDS[9], "printed")[5]] = 0.9
+    expected = []
+    for at in order[:5]:
+        for trace, first in (("printed", 2), ("updated", 3)):
+            expected += world_points(ALL_WORLDS[at], trace)[first : first + 4]
+    shuffled = dict(sorted(divergences.items(), key=lambda item: str(item[0])[::-1]))
+    assert finalists(table_of(shuffled)) == expected
+    assert len(expected) == WORLDS * POINTS * len(TRACES) == 40
+
+
+# --- the second stage ------------------------------------------------------------------------
+
+
+def test_nearest_by_hand() -> None:
+    """The world by the sum of both traces, and in it each trace's own nearest point."""
+    a, b = ALL_WORLDS[3], ALL_WORLDS[8]
+    divergences = {
+        **dict(zip(world_points(a, "printed"), (0.01, 0.02), strict=False)),  # nearest of all
+        **dict(zip(world_points(a, "updated"), (0.9, 0.8), strict=False)),
+        **dict(zip(world_points(b, "printed"), (0.3, 0.1), strict=False)),
+        **dict(zip(world_points(b, "updated"), (0.5, 0.7, 0.2), strict=False)),
+    }
+    expected = {"printed": world_points(b, "printed")[1], "updated": world_points(b, "updated")[2]}
+    fitting = {world_points(a, "printed")[0]}
+    assert nearest(table_of(divergences, fitting)) == expected
+    assert nearest(table_of(divergences, {*divergences})) == expected
+
+
+def test_nothing_fits() -> None:
+    """If no finalist fits, the plainest point is taken, whatever is nearest."""
+    divergences = dict.fromkeys(world_points(ALL_WORLDS[3], "printed"), 0.01)
+    divergences |= dict.fromkeys(world_points(ALL_WORLDS[3], "updated"), 0.02)
+    found = nearest(table_of(divergences))
+    assert found == {trace: (4, "random", "kept", 0.5, 0.5, trace) for trace in TRACES}
+
+
+def test_rule_follows_if_the_defaults_are_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The register follows from a table whose nearest points are its defaults, from no other."""
+    mine = {chosen(trace): 0.1 for trace in TRACES}
+    other = {world_points(ALL_WORLDS[0], trace)[0]: 0.3 for trace in TRACES}
+    assert ALL_WORLDS[0] != chosen("printed")[:3]
+    assert rule_follows(table_of(mine | other, {*mine}))
+    assert not rule_follows(table_of(mine | dict.fromkeys(other, 0.05), {*mine}))
+    assert not rule_follows(table_of(mine | other))
+
+
+# --- tables ----------------------------------------------------------------------------------
+
+
+def sample(mean: float, sd: float, n: int, seed: int = 1) -> Any:
+    """Return numbers with just this mean and SD."""
+    draw = np.random.default_rng(seed).normal(size=n)
+    return mean + sd * (draw - draw.mean()) / draw.std(ddof=1)
+
+
+def trials_of(part: str, number: int, counts: Any, *, converged: Any = 1) -> pd.DataFrame:
+    """Make the trials of one point up."""
+    columns = {"part": part, "number": number, "trial": np.arange(len(counts))}
+    return pd.DataFrame({**columns, "iterations": counts, "converged": converged})
+
+
+def test_table_of_a_stage() -> None:
+    """Each point has its own trials' numbers; it fits if mean and SD both do; caps are out."""
+    made = {
+        0: sample(PAIR.mean + 0.3, PAIR.sd, 40),
+        1: sample(PAIR.mean, 3 * PAIR.sd, 40),  # the mean alone fits
+        2: sample(PAIR.mean + 5, PAIR.sd, 40),  # the SD alone
+        3: sample(PAIR.mean, PAIR.sd, 40),  # a trial at the cap
+        points().index(chosen("printed")): sample(PAIR.mean - 0.9, 1.1 * PAIR.sd, 40),
+        5: np.full(40, 40.0),
+    }
+    trials = pd.concat(
+        [trials_of("final", k, counts, converged=int(k != 3)) for k, counts in made.items()]
+        + [trials_of("screen", 7, made[0]), trials_of("final", 9, made[0]).iloc[:0]]
     )
+    table = calibration_table(trials.sample(frac=1.0, random_state=2), "final")
+    assert len(table) == 6
+    numbers = [points().index(tuple(row)) for row in table[COLUMNS].itertuples(index=False)]
+    order = [0, points().index(chosen("printed")), 2, 1]
+    assert numbers[0] == 0
+    assert set(numbers[:4]) == set(order)
+    assert set(numbers[4:]) == {3, 5}
+    assert table["kl_divergence"].is_monotonic_increasing
+    assert np.isinf(table["kl_divergence"].to_numpy()[4:]).all()
+    assert dict(zip(numbers, table["fits"], strict=True)) == {
+        k: k in (0, points().index(chosen("printed"))) for k in made
+    }
+    assert table["default"].sum() == 1
+    for number, row in zip(numbers[:4], table.to_dict("records"), strict=False):
+        counts = made[number]
+        assert (row["n"], row["capped"]) == (40, 0)
+        assert (row["mean"], row["sd"]) == pytest.approx((counts.mean(), counts.std(ddof=1)))
+        assert row["low"] < row["mean"] < row["high"]
+        assert row["sd_low"] < row["sd"] < row["sd_high"]
+        assert row["kl_divergence"] == kl_divergence(row["mean"], row["sd"], PAIR)
+        assert row["default"] == (number == points().index(chosen("printed")))
+    only = calibration_table(trials, "screen")
+    assert points().index(tuple(only[COLUMNS].iloc[0])) == 7
+
+
+@pytest.mark.parametrize("off", [-1e-6, 1e-6])
+def test_border_of_what_fits(off: float) -> None:
+    """A point fits up to the borders of the prediction of mean and of SD, each with 95 %."""
+    _, mean_to = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, 50)
+    _, sd_to = sd_prediction(PAIR.sd, PAIR.n, sample(0, 1, 50))
+    for mean, sd in ((mean_to + off, PAIR.sd), (PAIR.mean, sd_to + off)):
+        table = calibration_table(trials_of("final", 0, sample(mean, sd, 50)), "final")
+        assert table["fits"].tolist() == [off < 0]
+
+
+def test_savings_are_against_the_same_point() -> None:
+    """What a set saves is from the finalist's own trials, with the same seeds, in their order."""
+    rng = np.random.default_rng(4)
+    base = {k: sample(40 + k, 5, 30, seed=k) for k in (10, 11)}
+    parts = [trials_of("final", k, counts) for k, counts in base.items()]
+    due = {}
+    for k, counts in base.items():
+        for place, set in enumerate(SETS):
+            saved = 3 * k + place + rng.normal(size=30)
+            due[k, set] = saved
+            parts.append(trials_of("fits", len(SETS) * k + place, counts - saved))
+    trials = pd.concat(parts).sample(frac=1.0, random_state=1)
+    table = savings_table(trials)
+    assert SETS == (NAMED, GENERAL)
+    assert table["set"].tolist() == [*SETS, *SETS]
+    for row in table.to_dict("records"):
+        saved = due[points().index(tuple(row[id] for id in COLUMNS)), row["set"]]
+        assert (row["n"], row["saved"]) == (30, pytest.approx(saved.mean()))
+        assert row["low"] < row["saved"] < row["high"]
+
+
+# --- what is run -----------------------------------------------------------------------------
 
 
 def test_calibration_is_apart_from_the_judging_run() -> None:
-    """Its root seed is among the explored ones, and what it used gets no verdict."""
-    assert load_claims().judging.root_seed != ROOT
-    assert any(ROOT in run.root_seeds for run in load_claims().explored)
+    """Its root seeds are known ones, and what it used gets no verdict."""
+    judging = load_claims().judging
+    known = {seed for run in load_claims().known for seed in run.root_seeds}
+    assert (SCREEN_SEED, FINAL_SEED) == (21, 22)
+    assert {SCREEN_SEED, FINAL_SEED} <= known
+    assert judging.root_seed not in (SCREEN_SEED, FINAL_SEED)
     for id in ("MEAN-UNIFIED-OPEN", "SD-UNIFIED-OPEN"):
         claim = load_claims().by_id(id)
-        assert "printed" in claim.used
+        assert "calibrated" in claim.used
         assert claim.published("unified").mean == PAIR.mean
 
 
-def test_conditions_differ_in_the_grid_alone(small_demos: Demos) -> None:
-    """Each point is the unified method with its four values, and all else at defaults."""
-    conditions = grid_conditions(as_maze(small_demos.environment))
-    assert list(conditions) == grid()
-    for (leg, alpha, f_start, ties), condition in conditions.items():
-        params = condition.params
-        assert condition.method == "unified"
-        assert (params.update.alpha, params.update.f_start) == (alpha, f_start)
-        assert params.learner.ties == ties
-        assert set(params.differences()) <= set(CALIBRATED)
-        other = conditions[leg, *chosen()[1:]]
-        assert condition.demos == other.demos
-    assert conditions[chosen()].params.differences() == {}
+def test_stages_are_as_the_register_says() -> None:
+    """All points with 10 trials; 40 finalists with 200; the sets at each finalist that fits."""
+    (one, screen), (two, final), (three, fits) = stages()
+    assert (one, two, three) == (SCREEN_SEED, FINAL_SEED, FINAL_SEED)
+    first = screen(pd.DataFrame())
+    assert len(first) == len(points())
+    assert {group.trials for group in first} == {SCREEN_TRIALS} == {10}
+    assert [group.labels for group in first[:2]] == [
+        {"part": "screen", "number": 0},
+        {"part": "screen", "number": 1},
+    ]
+    rng = np.random.default_rng(5)
+    trials = pd.concat(
+        trials_of("screen", k, sample(rng.normal(40, 3), PAIR.sd, 10, seed=k))
+        for k in range(len(points()))
+    )
+    second = final(trials)
+    expected = [points().index(p) for p in finalists(calibration_table(trials, "screen"))]
+    assert [group.labels["number"] for group in second] == expected
+    assert {group.trials for group in second} == {FINAL_TRIALS} == {200}
+    means = {number: PAIR.mean + 5 * (place % 10 > 0) for place, number in enumerate(expected)}
+    finals = [trials_of("final", k, sample(mean, PAIR.sd, 200)) for k, mean in means.items()]
+    third = fits(pd.concat([trials, *finals]))
+    fitting = {number for number, mean in means.items() if mean == PAIR.mean}
+    assert len(fitting) == 4
+    assert {group.labels["number"] for group in third} == {
+        len(SETS) * number + place for number in fitting for place in range(len(SETS))
+    }
+    assert {(group.labels["part"], group.trials) for group in third} == {("fits", 200)}
+    for group in (*first[::100], *second[::10], *third):
+        (own,) = group.conditions
+        again = declared_condition(str(group.labels["part"]), int(group.labels["number"]))
+        assert trial_key(again, 1, 2) == trial_key(own, 1, 2)
+        uses = group.labels["part"] == "fits"
+        assert own.method == ("unified-incorrect" if uses else "unified")
 
 
-def test_table_of_a_run(small_demos: Demos, tmp_path: object) -> None:
-    """The table has the trials' own numbers, the nearest point first, and one default."""
-    points = [chosen(), (2, 0.9, 0.5, "random"), (2, 0.1, 1.0, "first")]
-    numbers = [grid().index(point) for point in points]
-    every = plan(as_maze(small_demos.environment), 4)
-    groups = [every[number] for number in numbers]
-    store = Store(tmp_path / "trials.sqlite")  # type: ignore[operator]
-    trials = computed_table(groups, store=store, seed=ROOT)
-    table = calibration_table(trials)
-    assert len(table) == 3
-    assert table["default"].sum() == 1
-    assert table["kl_divergence"].is_monotonic_increasing
-    for row in table.to_dict("records"):
-        point = tuple(row[id] for id in CALIBRATED)
-        counts = trials.loc[trials["number"] == grid().index(point), "iterations"]
-        assert (row["n"], row["capped"]) == (4, 0)
-        assert row["mean"] == pytest.approx(counts.mean())
-        assert row["sd"] == pytest.approx(counts.std(ddof=1))
-        assert row["kl_divergence"] == kl_divergence(row["mean"], row["sd"], PAIR)
-        assert row["default"] == (point == chosen())
+def test_trials_of_the_stages_can_be_fewer() -> None:
+    """A quick look has fewer trials of each condition."""
+    (_, screen), (_, final), _ = stages(screen_trials=2, final_trials=3)
+    assert {group.trials for group in screen(pd.DataFrame())} == {2}
+    table = pd.concat(
+        trials_of("screen", k, sample(40, 1 + k % 7, 10)) for k in range(len(points()))
+    )
+    assert {group.trials for group in final(table)} == {3}
 
 
 # --- the check -------------------------------------------------------------------------------
 
 
 def test_check_holds_new_trials_against_the_published_distribution() -> None:
-    """The grid's trials have a row, and the new ones of the method one for each reading."""
-    draw = np.random.default_rng(1).normal(size=100)
-    draw = PAIR.mean + PAIR.sd * (draw - draw.mean()) / draw.std(ddof=1)
-    trials = pd.DataFrame(
-        {
-            "method": ["unified"] * 200 + ["unified-incorrect"] * 100,
-            "reading": ["printed"] * 100 + ["updated"] * 100 + ["printed"] * 100,
-            "iterations": [*draw, *(draw + 3), *(draw + 9)],
-        }
+    """A row for each trace and source: the finalist's trials, and the new ones of the method."""
+    draw = sample(PAIR.mean, PAIR.sd, 100)
+    parts = [
+        ("unified", "printed", draw),
+        ("unified", "updated", draw + 3),
+        ("unified-incorrect", "printed", draw + 9),
+        ("adaboost", "", draw + 20),
+    ]
+    judged = pd.concat(
+        pd.DataFrame({"method": m, "reading": f, "iterations": x, "converged": 1})
+        for m, f, x in parts
     )
-    number = grid().index(chosen())
-    others = pd.DataFrame({"number": [number + 1] * 30, "iterations": draw[30:60].astype(int)})
-    own = pd.DataFrame({"number": [number] * 30, "iterations": draw[:30].astype(int)})
-    check = check_table(pd.concat([others, own]), trials)
-    assert check.loc[0, "mean"] == own["iterations"].mean()
-    assert check["trials"].tolist() == ["grid", "new", "new"]
-    assert check["reading"].tolist() == ["printed", "printed", "updated"]
-    assert check["n"].tolist() == [30, 100, 100]
-    assert check["mean"].tolist()[1:] == pytest.approx([PAIR.mean, PAIR.mean + 3])
-    assert check["sd"].tolist()[1:] == pytest.approx([PAIR.sd] * 2)
+    numbers = {trace: points().index(chosen(trace)) for trace in TRACES}
+    other = next(k for k in range(9) if k not in numbers.values())
+    final = {trace: draw[:30] + k for k, trace in enumerate(TRACES)}
+    trials = pd.concat(
+        [
+            trials_of("final", other, draw[30:60]),
+            trials_of("screen", numbers["printed"], draw[60:]),
+            *(trials_of("final", numbers[trace], counts) for trace, counts in final.items()),
+        ]
+    )
+    check = check_table(trials, judged)
+    assert check["reading"].tolist() == ["printed", "printed", "updated", "updated"]
+    assert check["trials"].tolist() == ["calibration", "judging"] * 2
+    assert check["n"].tolist() == [30, 100] * 2
+    assert check["mean"].tolist() == pytest.approx(
+        [final["printed"].mean(), PAIR.mean, final["updated"].mean(), PAIR.mean + 3]
+    )
     for name, low, high in (("mean", "low", "high"), ("sd", "sd_low", "sd_high")):
         assert ((check[low] < check[name]) & (check[name] < check[high])).all()
     expected = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, 100)
     assert check.loc[1, ["predicted_low", "predicted_high"]].tolist() == pytest.approx(expected)
-
-
-# --- the published grid ----------------------------------------------------------------------
-
-
-def test_published_grid_is_whole_and_sorted(stored: pd.DataFrame) -> None:
-    """Each point is there once with the declared trials, the nearest first: the only default."""
-    assert tuple(stored.loc[0, list(CALIBRATED)]) == chosen()
-    assert stored["default"].tolist() == [True] + [False] * 119
-    points = set(stored[list(CALIBRATED)].itertuples(index=False, name=None))
-    assert points == set(grid())
-    assert set(stored["n"]) == {TRIALS}
-    assert stored["kl_divergence"].is_monotonic_increasing
-    expected = [kl_divergence(*row, PAIR) for row in zip(stored["mean"], stored["sd"], strict=True)]
-    assert stored["kl_divergence"].tolist() == pytest.approx(expected)
-
-
-def test_published_check_is_that_of_the_judging_run(stored: pd.DataFrame) -> None:
-    """The new trials are those that the claims are judged by, the others those of the grid."""
-    check = read_table(FIGURES / "calibration" / "check.csv")
-    judged = read_table(FIGURES / "claims" / "verdicts.csv")
-    assert check["n"].tolist() == [TRIALS, *[load_claims().judging.trials["open-maze"]] * 2]
-    assert check.loc[0, ["mean", "sd"]].tolist() == stored.loc[0, ["mean", "sd"]].tolist()
-    names = ["effect", "low", "high", "predicted_low", "predicted_high"]
-    for id, own in (
-        ("MEAN-UNIFIED-OPEN", ["mean", "low", "high", "predicted_low", "predicted_high"]),
-        ("SD-UNIFIED-OPEN", ["sd", "sd_low", "sd_high", "sd_predicted_low", "sd_predicted_high"]),
-    ):
-        expected = judged[judged["id"] == id][names].to_numpy(float)
-        np.testing.assert_allclose(check.loc[1:, own].to_numpy(float), expected, rtol=1e-8)
+    expected = sd_prediction(PAIR.sd, PAIR.n, draw)
+    assert check.loc[1, ["sd_predicted_low", "sd_predicted_high"]].tolist() == pytest.approx(
+        expected
+    )
+    without = check_table(trials[trials["part"] == "screen"], judged)
+    assert without["trials"].tolist() == ["judging", "judging"]

@@ -13,17 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from replication import Demos, load_demos, save_demos
-from replication.envs.maze import as_maze
-from replication.evidence import calibration, sweep
-from replication.evidence.experiments import EXPERIMENTS, Experiment, condition_of
+from replication import Demos, save_demos
+from replication.evidence import calibration, rounding, sweep
+from replication.evidence.experiments import EXPERIMENTS, Experiment
 from replication.evidence.recompute import declared_condition, recompute_trials, sampled
 from replication.evidence.tables import write_csv
 from replication.trials.compute import trial_key
 from replication.trials.store import Store
 from replication.trials.table import Group, computed_table, planned_table
 
-MEASURED = ("iterations", "converged", "early_errors", "q_growth", "q_slope", "reward_slope")
+MEASURED = (
+    *("iterations", "converged", "early_collisions", "early_errors", "q_growth", "reward_growth"),
+    *("acted", "acted_at_first", "with_hit", "with_detour"),
+)
 FEW = {"episodes": 60, "horizon": 40, "max_iterations": 20}
 HEAD = "task,method,reading,set,trial,seed\n"
 
@@ -32,9 +34,10 @@ HEAD = "task,method,reading,set,trial,seed\n"
 def table(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return the trials.csv of a small task, with its store beside it."""
     save_demos(small_demos, tmp_path / "small.json")
-    experiment = Experiment(str(tmp_path / "small.json"), FEW, ("adaboost", "unified"))
+    methods = ("adaboost", "unified", "unified-incorrect")
+    experiment = Experiment(str(tmp_path / "small.json"), FEW, methods, ("hit+detour",))
     monkeypatch.setitem(EXPERIMENTS, "small", experiment)
-    groups = [Group(list(experiment.conditions().values()), 4)]
+    groups = [Group(list(experiment.conditions().values()), 2)]
     store = Store(tmp_path / "s.sqlite")
     trials = computed_table(groups, errors=True, store=store, seed=4)
     return write_csv(trials, tmp_path / "trials.csv")
@@ -55,7 +58,7 @@ def test_what_was_computed_here_agrees(table: Path) -> None:
     """All trials are computed again, with or without a store, by any number of workers."""
     told: list[int] = []
     assert wrong(table, report=told.append) == []
-    assert told == [12]
+    assert told == [6 * 2]
     assert wrong(table, jobs=2) == []
     table.with_name("s.sqlite").unlink()
     assert wrong(table) == []
@@ -95,10 +98,10 @@ def test_a_changed_number_is_found(table: Path, column: str) -> None:
 
 def test_rows_in_other_words_are_found(table: Path) -> None:
     """A column that is not there, or one too many, is a difference of every row."""
-    trials_of(table).drop(columns="q_slope").assign(note="good").to_csv(table, index=False)
+    trials_of(table).drop(columns="q_growth").assign(note="good").to_csv(table, index=False)
     messages = wrong(table)
     assert len(messages) == 12
-    assert all("gives another note, q_slope" in message for message in messages)
+    assert all("gives another note, q_growth" in message for message in messages)
 
 
 @pytest.mark.parametrize(
@@ -129,6 +132,8 @@ def test_a_damaged_file_is_one_line(table: Path, content: bytes, message: str) -
         ("small,unified,printed,none,1000000000,4", "impossible number"),
         ("small,unheard,printed,none,0,4", "unheard"),
         ("small,unified,unheard,none,0,4", "unheard"),
+        ("small,unified,at-once,none,0,4", "no reading 'at-once'"),
+        ("small,unified,printed,hit+detour,0,4", "with the set 'hit+detour'"),
         ("small,unified-incorrect,printed,unheard,0,4", "unheard"),
         ("other,unified,printed,none,0,4", "unknown task"),
     ],
@@ -163,10 +168,25 @@ def test_a_changed_stored_trial_is_found(table: Path) -> None:
 # --- conditions ------------------------------------------------------------------------------
 
 
-def test_conditions_of_the_sweep_and_the_grid_come_back() -> None:
+def planned() -> list[Group]:
+    """Return some groups of every notebook that has a table of parts."""
+    (_, screen), *_ = calibration.stages(screen_trials=1)
+    fits = calibration.declared_condition("fits", 77)
+    return [
+        *sweep.plan(most_trials=1, most_specifications=3),
+        *screen(pd.DataFrame())[:3],
+        Group([fits], 1, {"part": "fits", "number": 77}),
+        *rounding.plan(1)[:4],
+    ]
+
+
+def test_conditions_of_all_parts_come_back() -> None:
     """A row with a part and a number belongs to the condition that was planned there."""
-    maze = as_maze(load_demos(EXPERIMENTS["open-maze"].demos).environment)
-    groups = sweep.plan(most_trials=1, most_specifications=3) + calibration.plan(maze, 1)[:3]
+    groups = planned()
+    assert {group.labels["part"] for group in groups} == {
+        *sweep.TRIALS,
+        *("screen", "fits", "rounding"),
+    }
     for group in groups:
         table = planned_table([group], 7)
         for row, condition in zip(
@@ -178,7 +198,10 @@ def test_conditions_of_the_sweep_and_the_grid_come_back() -> None:
 
 @pytest.mark.parametrize(
     ("part", "number"),
-    [("mazes", "-1"), ("mazes", "1000"), ("grid", "120"), ("numbers", "99"), ("unheard", "0")],
+    [
+        *(("mazes", "-1"), ("mazes", "1000"), ("numbers", "99"), ("unheard", "0")),
+        *(("screen", "480"), ("final", "480"), ("fits", "960"), ("fits", "-1"), ("rounding", "90")),
+    ],
 )
 def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:
     """A part or a number that nothing was declared for is refused."""
@@ -190,9 +213,7 @@ def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:
 @pytest.mark.parametrize("task", list(EXPERIMENTS))
 def test_conditions_of_the_experiments_come_back(task: str) -> None:
     """A row of a table of trials has all that is needed to make its condition again."""
-    for (method, reading), condition in EXPERIMENTS[task].conditions().items():
-        used = (
-            condition.params.demonstrations.incorrect if condition.rule.uses_incorrect else "none"
-        )
-        again = condition_of(task, method, reading, used)
+    for key, condition in EXPERIMENTS[task].conditions().items():
+        row = dict(zip(("task", "method", "reading", "set"), (task, *key), strict=True))
+        again = declared_condition(row)
         assert trial_key(again, 1, 0) == trial_key(condition, 1, 0)

@@ -10,8 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from replication.evidence.claims import Claim, load_claims
+from replication.evidence.joint import joint_test
 from replication.evidence.sensitivity import (
     HOLDS,
+    JOINT,
     NOISE,
     OPEN,
     REST,
@@ -22,6 +24,7 @@ from replication.evidence.sensitivity import (
     effects_table,
     epsilon_squared,
     level_table,
+    neutral,
     outcome_shares,
     shares_table,
 )
@@ -52,7 +55,7 @@ def effects(
     effect: NDArray[np.float64],
     *,
     half: float = 0.0,
-    statistic: str = "mean-difference",
+    statistic: str = "saved",
     claim: str = "FASTER",
 ) -> pd.DataFrame:
     """Make effects up, with intervals of one width."""
@@ -68,7 +71,7 @@ def effects(
             "low": effect - half,
             "high": effect + half,
             "outcome": [
-                HOLDS if x + half < 0 else REVERSED if x - half > 0 else OPEN for x in effect
+                HOLDS if x - half > 0 else REVERSED if x + half < 0 else OPEN for x in effect
             ],
         }
     )
@@ -80,13 +83,16 @@ def effects(
 @pytest.mark.parametrize(
     ("id", "effect", "low", "high", "expected"),
     [
-        ("FASTER", -2.0, -3.0, -1.0, HOLDS),
-        ("FASTER", -2.0, -4.0, 0.0, OPEN),
-        ("FASTER", 2.0, 1.0, 3.0, REVERSED),
+        ("FASTER", 2.0, 1.0, 3.0, HOLDS),
+        ("FASTER", 2.0, 0.0, 4.0, OPEN),
+        ("FASTER", -2.0, -3.0, -1.0, REVERSED),
+        ("SAVES-SOCCER", 1.0, 0.5, 1.5, HOLDS),  # less than its margin of interest, but more than 0
+        ("AVOIDS-OPEN", -1.0, -1.5, -0.5, REVERSED),
         ("STEADIER", 0.5, 0.3, 0.9, HOLDS),
         ("STEADIER", 0.9, 0.8, 1.0, OPEN),
         ("STEADIER", 1.5, 1.1, 2.0, REVERSED),
         ("Q-GROWS", 1.0, 0.5, 1.5, HOLDS),
+        ("Q-GROWS", 1.0, 0.0, 2.0, OPEN),
         ("Q-GROWS", -1.0, -1.5, -0.5, REVERSED),
         ("STEADIER", math.nan, math.nan, math.nan, UNDEFINED),
         ("ZERO-OPEN", 1.0, 0.7, 1.0, HOLDS),
@@ -95,8 +101,14 @@ def effects(
     ],
 )
 def test_outcome_by_hand(id: str, effect: float, low: float, high: float, expected: str) -> None:
-    """The whole interval lies beyond the margin; a share holds where it is itself above it."""
+    """The whole interval lies beyond no effect; a share holds where it is above its margin."""
     assert _outcome(load_claims().by_id(id), effect, low, high) == expected
+
+
+def test_no_effect_by_hand() -> None:
+    """Nothing is saved at 0, SDs are equal at 1, a mean stays at 0; a share has its margin."""
+    expected = {"SAVES-SOCCER": 0.0, "STEADIER": 1.0, "Q-GROWS": 0.0, "ZERO-OPEN": 0.9}
+    assert {id: neutral(load_claims().by_id(id)) for id in expected} == expected
 
 
 def test_effects_of_many_rows_are_those_of_each() -> None:
@@ -105,7 +117,8 @@ def test_effects_of_many_rows_are_those_of_each() -> None:
     x, y = rng.normal(36, 4, (4, 12)), rng.normal(40, 8, (4, 12))
     one = load_claims().by_id
     found = _effects(one("FASTER"), x, y)
-    np.testing.assert_array_equal(found, ((x - y).mean(axis=1), *mean_interval(x - y)))
+    np.testing.assert_array_equal(found, ((y - x).mean(axis=1), *mean_interval(y - x)))
+    assert (found[0] > 0).all()  # x needs fewer
     np.testing.assert_array_equal(
         _effects(one("Q-GROWS"), x, x), (x.mean(axis=1), *mean_interval(x))
     )
@@ -268,6 +281,72 @@ def test_levels_add_up() -> None:
     assert not row["default"]
 
 
+# --- all specifications at once --------------------------------------------------------------
+
+
+def trials_under(specifications: int, saved: NDArray[np.float64], n: int = 20) -> pd.DataFrame:
+    """Make trials up: what each specification saves, beside the same noise in all of them."""
+    rng = np.random.default_rng(8)
+    noise = rng.normal(0, 2, n)
+    parts = []
+    for number in range(specifications):
+        y = 40 + rng.normal(0, 3, n)
+        x = y - saved[number] - noise - rng.normal(0, 0.5, n)
+        for method, counts in (("unified-incorrect", x), ("unified", y)):
+            columns = {"number": number, "method": method, "iterations": counts, "converged": 1}
+            parts.append(pd.DataFrame(columns | {"trial": np.arange(n), "q_growth": counts}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_joint_columns_are_those_of_the_joint_test() -> None:
+    """Each group is tested by itself; bounds are those of the rank; other claims have none."""
+    saved = np.array([3.0, 0.0, 1.0, -2.0, 0.5, 4.0])
+    trials = trials_under(6, saved)
+    names = ["TIES=first", "", "ALPHA=0.1", "ALPHA=0.9", "TIES=first", "TIES=random"]
+    specifications = [
+        Specification(
+            "single" if k < 4 else "factorial",
+            tuple((id, value) for id, value in (part.split("=") for part in name.split())),
+        )
+        for k, name in enumerate(names)
+    ]
+    one = load_claims().by_id
+    table = effects_table(trials, specifications, [one("SAVES-OPEN"), one("Q-GROWS")])
+    columns = ["p_family", "null_low", "null_high", "p_median", "p_holds"]
+    assert list(JOINT) == columns
+    own = table[table["claim"] == "SAVES-OPEN"]
+    assert table.loc[table["claim"] == "Q-GROWS", columns].isna().all(axis=None)
+    assert own["group"].tolist() == ["single"] * 4 + ["factorial"] * 2
+    pivot = trials.pivot(index=["number", "method"], columns="trial", values="iterations")
+    d = (pivot.xs("unified", level=1) - pivot.xs("unified-incorrect", level=1)).to_numpy()
+    assert own["effect"].tolist() == pytest.approx(d.mean(axis=1).tolist())
+    for group, rows in (("single", slice(0, 4)), ("factorial", slice(4, 6))):
+        part, test = own[own["group"] == group], joint_test(d[rows])
+        assert part["p_family"].tolist() == pytest.approx(test.p_familywise.tolist())
+        assert set(part["p_median"]) == {test.p_median}
+        assert set(part["p_holds"]) == {test.p_significant}
+        ranked = part.sort_values("effect")
+        assert ranked["null_low"].tolist() == pytest.approx(test.null_low.tolist())
+        assert ranked["null_high"].tolist() == pytest.approx(test.null_high.tolist())
+    assert own["p_family"].iloc[0] < 0.05  # three iterations are found, none are not
+    assert own["p_family"].iloc[1] > 0.2
+    assert own["outcome"].tolist()[:4] == [HOLDS, OPEN, OPEN, REVERSED]
+
+
+def test_joint_test_is_of_what_is_saved() -> None:
+    """Where nothing is saved in any specification the joint p-values say so; where much, too."""
+    one = load_claims().by_id("SAVES-OPEN")
+    specifications = [Specification("single", (("ALPHA", k),)) for k in range(8)]
+    nothing, much, lost = (
+        effects_table(trials_under(8, np.full(8, saved)), specifications, [one]).iloc[0]
+        for saved in (0.0, 3.0, -3.0)
+    )
+    assert min(nothing["p_median"], nothing["p_holds"]) > 0.05
+    assert max(much["p_median"], lost["p_median"]) < 0.01
+    assert much["p_holds"] < 0.05  # all of them hold in a fortieth of the flips, they are so alike
+    assert lost["p_holds"] == 1.0
+
+
 # --- the published effects -------------------------------------------------------------------
 
 FIGURES = PROJECT / "figures" / "sensitivity"
@@ -299,11 +378,10 @@ def test_published_tables_follow_from_the_published_effects(published: pd.DataFr
 
 
 def test_published_effects_have_their_outcomes(published: pd.DataFrame) -> None:
-    """Every published outcome follows from its effect and interval, by the claim's margin."""
-    assert len(published) == 8 * 240 + 8 * 44 + 3 * 19
+    """Every published outcome follows from its effect and interval, by the claim's side."""
     for row in published.itertuples():
         claim = load_claims().by_id(row.claim)
-        assert (row.margin, row.measure) == (claim.margin, claim.measure)
+        assert (row.neutral, row.measure) == (neutral(claim), claim.measure)
         assert row.outcome == _outcome(claim, row.effect, row.low, row.high)
 
 
@@ -335,7 +413,8 @@ def test_effects_are_those_of_the_trials(tiny: Run) -> None:
         if claim.statistic == "share":
             assert row.effect == min(a.mean(), b.mean())
         else:
-            assert row.effect == pytest.approx((a - b).mean() if claim.y else a.mean())
+            assert row.effect == pytest.approx((b - a).mean() if claim.y else a.mean())
+        assert row.neutral == neutral(claim)
         assert row.low <= row.effect <= row.high
         assert row.capped_x == (x["converged"] == 0).sum()
         assert row.capped == row.capped_x + (y["converged"] == 0).sum()

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from replication.evidence.claims import ClaimError, load_claims
+from replication.evidence.experiments import GENERAL, NAMED
 from replication.evidence.specifications import (
     Factorial,
     default_of,
@@ -21,6 +22,7 @@ from replication.evidence.specifications import (
     sort_key,
 )
 from replication.files import PROJECT
+from replication.irl import READINGS
 from replication.paper.register import ChoiceError, load_choices
 
 TEXT = (PROJECT / "replication" / "evidence" / "specifications.toml").read_text(encoding="utf-8")
@@ -33,30 +35,41 @@ FACTORIAL = factorial_specifications(PLAN.mazes.factorial)
 
 
 def test_enough_is_declared() -> None:
-    """At least 40 specifications change one choice, at least 200 ten at once, all distinct."""
+    """At least 40 specifications change one choice, at least 200 eleven at once, all distinct."""
     assert len(SINGLE) >= 40
     assert len(FACTORIAL) >= 200
-    assert len({len(one.choices) for one in FACTORIAL}) == 1
+    assert {len(one.choices) for one in FACTORIAL} == {11}
     for specifications in (SINGLE, FACTORIAL, SOCCER):
         assert len({one.choices for one in specifications}) == len(specifications)
         assert len({one.name for one in specifications}) == len(specifications)
 
 
-def test_root_seed_is_the_judging_one() -> None:
-    """The same trials are behind the verdicts and the defaults of the specifications."""
-    assert load_claims().judging.root_seed == PLAN.root_seed
+def test_root_seed_is_new() -> None:
+    """The trials are neither those of the verdicts nor any that were known before."""
+    known = {seed for run in load_claims().known for seed in run.root_seeds}
+    assert PLAN.root_seed not in {*known, load_claims().judging.root_seed}
     assert PLAN.mazes.single.trials >= load_claims().judging.fewest
 
 
 def test_every_claim_with_an_effect_is_evaluated() -> None:
     """All are but the published numbers and the maze with obstacles, which is a value of MAP."""
-    evaluated = {*PLAN.mazes.claims, *PLAN.soccer.claims}
-    expected = {
+    evaluated = [*PLAN.mazes.claims, *PLAN.soccer.claims]
+    expected = [
         one.id
         for one in load_claims().claim
-        if one.direction != "inside" and one.task != "obstacle-maze"
-    }
-    assert evaluated == expected
+        if not one.is_published and one.task != "obstacle-maze"
+    ]
+    assert sorted(evaluated) == sorted(expected)
+
+
+def test_rounding_and_all_readings_are_varied() -> None:
+    """Tolerance and arithmetic, each registered value, and the three readings are among them."""
+    assert PLAN.mazes.factorial.choices["F-INDEX"] == READINGS
+    for choices in (PLAN.mazes.single.choices, PLAN.soccer.single.choices):
+        assert {default_of("F-INDEX"), *choices["F-INDEX"]} == {*READINGS}
+    for id in ("TIE-TOLERANCE", "ARITHMETIC"):
+        assert {*PLAN.mazes.single.choices[id]} == {*load_choices()[id].alternatives}
+    assert {NAMED, GENERAL} <= {*PLAN.mazes.factorial.choices["INCORRECT-KINDS"]}
 
 
 @pytest.mark.parametrize("choices", [PLAN.mazes.single.choices, PLAN.soccer.single.choices])
@@ -175,7 +188,7 @@ def test_values_sort_as_text_as_they_do_themselves(values: list[Any]) -> None:
         ("trials = 10", "trials = 1", "mazes.factorial.trials: Input should be greater than or"),
         ("size = 240", "size = 0", "mazes.factorial.size: Input should be greater than or"),
         ("seed = 240", "seed = -1", "mazes.factorial.seed: Input should be greater than or"),
-        ("root_seed = 2026", "root_seed = -1", "root_seed: Input should be greater than or"),
+        ("root_seed = 4052", "root_seed = -1", "root_seed: Input should be greater than or"),
         ("iteration_cap = 200", "iteration_cap = 0", "iteration_cap: Input should be greater"),
         ("numbers = [0", "numbers = [-1", "ablations.numbers.0"),
         ("numbers = [0, ", "numbers = [", "ablations.numbers: add 0"),

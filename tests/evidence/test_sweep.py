@@ -8,9 +8,11 @@ import pytest
 
 from replication import Demos
 from replication.evidence import sweep
-from replication.evidence.experiments import method_conditions
+from replication.evidence.experiments import NAMED, NONE, conditions_of
 from replication.evidence.sweep import ablations_table, numbers_table
 from replication.evidence.tables import pairs_near
+from replication.irl import READINGS
+from replication.irl.methods import TRACES
 from replication.trials.measures import measure_trials
 from replication.trials.store import Store
 from replication.trials.table import computed_table, planned_table
@@ -28,7 +30,7 @@ def test_limits_reach_the_plan() -> None:
     table = planned_table(groups, 7)
     assert set(table["seed"]) == {7}
     first = table[(table["part"] == "mazes") & (table["number"] == 0)]
-    assert len(first) == 9  # one reading of Eq. 9 of three methods
+    assert len(first) == 9  # three methods, under one reading of Eq. 9 and with one set
 
 
 def test_effects_are_those_of_a_part(tmp_path: Path) -> None:
@@ -72,11 +74,11 @@ def test_ablations_are_summaries_of_the_trials(tiny: Run) -> None:
 def test_numbers_save_against_none(small_demos: Demos, tiny: Run) -> None:
     """What n incorrect demonstrations save is against none, over the same seeds and reading."""
     results, _ = tiny
-    usual = method_conditions(small_demos, FEW)
+    usual = conditions_of(small_demos, FEW, sets=[NAMED])
     conditions = {
-        (n, f): usual["unified-incorrect" if n else "unified", f]
+        (n, f): usual["unified-incorrect" if n else "unified", f, NAMED if n else NONE]
         for n in (0, 9)
-        for f in ("printed", "updated")
+        for f in (READINGS if n else TRACES)
     }
     measured = [
         measure_trials(results, [condition]).assign(number=place)
@@ -86,10 +88,11 @@ def test_numbers_save_against_none(small_demos: Demos, tiny: Run) -> None:
     table = numbers_table(trials, conditions, paper=3.62)
     assert set(table["paper"]) == {3.62}
     assert list(zip(table["number"], table["reading"], strict=True)) == list(conditions)
+    places = {key: place for place, key in enumerate(conditions)}
     for row in table.itertuples():
+        base = "updated" if row.reading == "updated" else "printed"
         counts, none = (
-            measured[list(conditions).index((number, row.reading))]["iterations"]
-            for number in (row.number, 0)
+            measured[places[key]]["iterations"] for key in ((row.number, row.reading), (0, base))
         )
         saved = none - counts
         assert (row.mean, row.saved) == (counts.mean(), saved.mean())

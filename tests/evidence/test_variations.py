@@ -9,7 +9,7 @@ import pytest
 
 from replication import Demos, Maze, load_demos
 from replication.envs.maze import as_maze
-from replication.evidence.experiments import EXPERIMENTS
+from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, Key
 from replication.evidence.specifications import (
     MAPS,
     RANDOM,
@@ -30,10 +30,13 @@ from replication.evidence.variations import (
     trace_conditions,
 )
 from replication.files import resolve
-from replication.irl import READINGS
+from replication.irl import READINGS, get_method
+from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
 from replication.trials.condition import Condition
 from replication.trials.measures import marked_pairs
+
+Numbered = dict[tuple[int, str], Condition]
 
 PLAN = load_specifications()
 CAP = PLAN.iteration_cap
@@ -49,41 +52,61 @@ def expert_choices(one: Specification) -> set[str]:
     return {id for id, _ in one.choices} & {"MAP", "DEMO-SHAPE", "DEMO-PATH", "DETOUR-WIDTH"}
 
 
+def calibrated(reading: str) -> dict[str, Any]:
+    """Return what differs from the defaults under a reading of Eq. 9: itself, and its own rates."""
+    own = {"alpha": "ALPHA", "f_start": "F-START"}
+    rates = {own[name]: value for name, value in CALIBRATED.get(reading, {}).items()}
+    return ({"F-INDEX": reading} if reading not in ("", "printed") else {}) | rates
+
+
 # --- what a specification changes ------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def default() -> dict[tuple[str, str], Condition]:
+def default() -> dict[Key, Condition]:
     """Return the conditions of the default specification."""
     return maze_conditions(SINGLE[0], CAP)
 
 
 def test_default_is_the_experiment_of_the_open_maze(
-    default: dict[tuple[str, str], Condition],
+    default: dict[Key, Condition],
 ) -> None:
     """Under the default the conditions are those of Table I, but for the iteration cap."""
     table = EXPERIMENTS["open-maze"].conditions()
-    assert set(default) == {key for key in table if key[1] in ("", "printed")}
+    assert list(default) == [
+        ("adaboost", "", "none"),
+        ("unified", "printed", "none"),
+        ("unified-incorrect", "printed", "hit+detour"),
+    ]
     for key, condition in default.items():
         assert condition.demos.correct == table[key].demos.correct
         assert condition.demos.incorrect == table[key].demos.incorrect
-        assert condition.params.differences() == {"ITERATION-CAP": CAP}
+        changed = {"ITERATION-CAP": CAP, **table[key].params.differences()}
+        assert condition.params.differences() == changed
+        assert set(changed) <= {"ITERATION-CAP", "INCORRECT-KINDS"}
 
 
 @pytest.mark.parametrize(
     "one", [s for s in SINGLE[1:] if s.choices[0][1] not in SLOW], ids=lambda s: s.name
 )
 def test_single_specification_changes_one_choice(
-    one: Specification, default: dict[tuple[str, str], Condition]
+    one: Specification, default: dict[Key, Condition]
 ) -> None:
     """Either one parameter or the demonstrations differ from the default, and nothing else."""
     ((id, value),) = one.choices
     conditions = maze_conditions(one, CAP)
     reading = value if id == "F-INDEX" else "printed"
-    assert set(conditions) == {(method, f and reading) for method, f in default}
-    for (method, f), condition in conditions.items():
-        other = default[method, f and "printed"]
+    set_ = value if id == "INCORRECT-KINDS" else "hit+detour"
+    assert list(conditions) == [
+        ("adaboost", "", "none"),
+        ("unified", get_method("unified").under(str(reading)), "none"),
+        ("unified-incorrect", reading, set_),
+    ]
+    for (method, f, _), condition in conditions.items():
+        other = next(each for key, each in default.items() if key[0] == method)
         changed = condition.params.differences()
+        if method != "unified-incorrect":
+            changed.pop("INCORRECT-KINDS", None)  # it is given none
         if expert_choices(one):
             assert changed == {"ITERATION-CAP": CAP}
             assert condition.demos != other.demos
@@ -98,7 +121,11 @@ def test_single_specification_changes_one_choice(
                 assert len(condition.demos.correct[0].actions) == 31
                 assert condition.demos.correct != other.demos.correct
         else:
-            expected = {id: value} if (id, f) != ("F-INDEX", "") else {}
+            expected = {id: value}
+            if id == "INCORRECT-KINDS" and method != "unified-incorrect":
+                expected = {}
+            if id == "F-INDEX":
+                expected = calibrated(f)
             assert changed == {"ITERATION-CAP": CAP, **expected}
             assert condition.demos == other.demos
 
@@ -107,12 +134,16 @@ def test_single_specification_changes_one_choice(
 def test_soccer_specification_changes_one_choice(one: Specification) -> None:
     """In robot soccer, too: a parameter, the world, or where the expert errs."""
     task = EXPERIMENTS["soccer"].conditions()
-    base = next(iter(task.values()))
+    base = task["unified", "printed", "none"]
     usual = {**base.params.differences(), "ITERATION-CAP": CAP}
     conditions = soccer_conditions(one, CAP)
     choices = dict(one.choices)
-    reading = choices.pop("F-INDEX", "printed")
-    assert set(conditions) == {(method, reading) for method, f in task if f == "printed"}
+    reading = str(choices.pop("F-INDEX", "printed"))
+    set_ = choices.pop("INCORRECT-KINDS", "all")
+    assert list(conditions) == [
+        ("unified", get_method("unified").under(reading), "none"),
+        ("unified-incorrect", reading, set_),
+    ]
     if "SOCCER-EPISODES" in choices:
         choices["EPISODES"] = choices.pop("SOCCER-EPISODES")
     world = {
@@ -121,9 +152,9 @@ def test_soccer_specification_changes_one_choice(one: Specification) -> None:
         if load_choices()[id].field.startswith("SoccerP")
     }
     elsewhere = choices.pop("SOCCER-INCORRECT", None)
-    for condition in conditions.values():
+    for (_, f, given), condition in conditions.items():
         assert (condition.demos.incorrect != base.demos.incorrect) == bool(elsewhere or world)
-        expected = {**usual, **choices, **({"F-INDEX": "updated"} if reading == "updated" else {})}
+        expected = {**usual, **calibrated(f), **choices, "INCORRECT-KINDS": given}
         assert condition.params.differences() == expected
         theirs, ours = base.demos.environment, condition.demos.environment
         assert (theirs.params != ours.params) == bool(world)  # type: ignore[attr-defined]
@@ -144,12 +175,18 @@ def test_factorial_specification_sets_all_its_choices() -> None:
         reading = choices.pop("F-INDEX")
         moves = {"open": 31, "obstacles": 33}[str(choices.pop("MAP"))]
         del choices["DEMO-SHAPE"]
-        assert {f for _, f in conditions} == {"", reading}
-        for (_, f), condition in conditions.items():
+        kinds = choices.pop("INCORRECT-KINDS")
+        assert list(conditions) == [
+            ("adaboost", "", "none"),
+            ("unified", get_method("unified").under(str(reading)), "none"),
+            ("unified-incorrect", reading, kinds),
+        ]
+        for (_, f, set_), condition in conditions.items():
             assert len(condition.demos.correct[0].actions) == moves
             values = condition.params.values()
             assert values["max_iterations"] == CAP
-            assert values["f_index"] == (reading if f else "printed")
+            assert values["f_index"] == (f or "printed")
+            assert values["incorrect"] == set_
             for id, value in choices.items():
                 assert values[load_choices()[id].field.split(".")[1]] == value
 
@@ -192,7 +229,7 @@ def test_random_mazes_depend_on_their_seed_alone(template: Maze) -> None:
 def test_random_map_lets_the_expert_show_everything(template: Maze) -> None:
     """In a declared random maze each kind of mistake can be driven, and the task has its name."""
     one = Specification("single", (("MAP", "random-1"), ("INCORRECT-KINDS", "all")))
-    demos = maze_conditions(one, CAP)["unified-incorrect", "printed"].selected
+    demos = maze_conditions(one, CAP)["unified-incorrect", "printed", "all"].selected
     stored = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
     assert set(demos.kinds) == set(stored.kinds)
     assert (demos.task, len(demos.correct[0].actions)) == ("random-1-maze", MOVES)
@@ -208,16 +245,25 @@ def test_random_map_lets_the_expert_show_everything(template: Maze) -> None:
 
 
 def test_ablations_of_the_trace() -> None:
-    """The default and two ablations, each without and with incorrect ones, under both readings."""
+    """The default and two ablations, without incorrect ones under both traces, with in all."""
     conditions = trace_conditions(PLAN.ablations, CAP)
-    assert len(conditions) == 12
+    names = ["default", "ALPHA=0.0 F-START=1.0", "ALPHA=0.0"]
+    assert set(conditions) == {
+        (method, f, name)
+        for name in names
+        for method in ("unified", "unified-incorrect")
+        for f in get_method(method).readings
+    }
+    assert len(conditions) == 15
     for (method, reading, changed), condition in conditions.items():
         update = condition.params.update
         assert (condition.method, update.f_index) == (method, reading)
+        own = CALIBRATED.get(reading, {})
+        usual = own.get("alpha", default_of("ALPHA")), own.get("f_start", default_of("F-START"))
         expected = {
-            "default": (default_of("ALPHA"), default_of("F-START")),
+            "default": usual,
             "ALPHA=0.0 F-START=1.0": (0.0, 1.0),
-            "ALPHA=0.0": (0.0, default_of("F-START")),
+            "ALPHA=0.0": (0.0, usual[1]),
         }[changed]
         assert (update.alpha, update.f_start) == expected
         assert condition.params.loop.max_iterations == CAP
@@ -229,25 +275,25 @@ def test_ablations_begin_with_the_default() -> None:
     conditions = ablation_conditions(PLAN.ablations, CAP)
     assert next(iter(conditions)) == ("unified", "printed", "default")
     rules = [key for key in conditions if key[0] == "adaboost"]
-    assert len(rules) == len(conditions) - 12 == 5
+    assert len(rules) == len(conditions) - 15 == 5
     for method, reading, changed in rules:
         rule = conditions[method, reading, changed].params.update.adaboost_rule
         assert (reading, changed) == ("", f"ADABOOST-RULE={rule}")
 
 
 @pytest.fixture(scope="module")
-def numbered() -> dict[tuple[int, str], Condition]:
+def numbered() -> Numbered:
     """Return the conditions with ever more incorrect demonstrations."""
     return numbered_conditions(PLAN.ablations, CAP)
 
 
-def test_more_demonstrations_mark_more_pairs(numbered: dict[tuple[int, str], Condition]) -> None:
+def test_more_demonstrations_mark_more_pairs(numbered: Numbered) -> None:
     """Each set holds the one before, so that the marked pairs grow from none to all."""
     before: tuple[Any, ...] = ()
     marked = np.zeros((400, 4), dtype=bool)
     for number in dict.fromkeys(number for number, _ in numbered):
-        shown = {numbered[number, f].selected for f in READINGS}
-        (selected,) = {one.incorrect for one in shown}
+        shown = [one for (n, _), one in numbered.items() if n == number]
+        (selected,) = {one.selected.incorrect for one in shown}
         assert len(selected) == number
         assert selected[: len(before)] == before
         now = marked_pairs(numbered[number, "printed"].selected)
@@ -257,7 +303,7 @@ def test_more_demonstrations_mark_more_pairs(numbered: dict[tuple[int, str], Con
     assert number > max(n for n in PLAN.ablations.numbers if n != "all")
 
 
-def test_all_demonstrations_mark_all_pairs(numbered: dict[tuple[int, str], Condition]) -> None:
+def test_all_demonstrations_mark_all_pairs(numbered: Numbered) -> None:
     """The largest set marks each pair of a state that is not the goal that the expert lacks."""
     largest = max(number for number, _ in numbered)
     demos = numbered[largest, "printed"].selected
@@ -270,7 +316,7 @@ def test_all_demonstrations_mark_all_pairs(numbered: dict[tuple[int, str], Condi
 
 
 def test_numbered_demonstrations_lead_to_their_pair(
-    numbered: dict[tuple[int, str], Condition],
+    numbered: Numbered,
 ) -> None:
     """Each is a shortest way to a state and then one wrong action; no two show the same pair."""
     demos = numbered[max(number for number, _ in numbered), "printed"].selected
@@ -299,13 +345,16 @@ def distances_from_start(demos: Demos) -> dict[int, int]:
 
 
 def test_numbered_settings_differ_in_demonstrations_alone(
-    numbered: dict[tuple[int, str], Condition],
+    numbered: Numbered,
 ) -> None:
     """Without incorrect demonstrations it is the method that uses none; the cap reaches all."""
+    for number in {number for number, _ in numbered}:
+        readings = [f for n, f in numbered if n == number]
+        assert readings == list(READINGS if number else TRACES)
     for (number, f), condition in numbered.items():
         assert condition.method == ("unified-incorrect" if number else "unified")
         assert condition.params.update.f_index == f
-        changed = set(condition.params.differences()) - {"F-INDEX"}
-        assert changed == {"ITERATION-CAP", "INCORRECT-KINDS"}
-        assert condition.params.loop.max_iterations == CAP
+        changed = condition.params.differences()
+        assert changed.pop("INCORRECT-KINDS") == ("all" if number else "none")
+        assert changed == {"ITERATION-CAP": CAP, **calibrated(f)}
         assert condition.demos.correct == numbered[0, "printed"].demos.correct

@@ -168,7 +168,7 @@ probability = st.floats(0, 1)
 def test_rule_is_symmetric(effect: float, p: float, p_absent: float, level: float) -> None:
     """Mirrored effects and exchanged sides turn shown into reversed, and nothing else."""
     turned = {SHOWN: REVERSED, REVERSED: SHOWN}
-    numbers = {"p": p, "p_absent": p_absent, "level": level}
+    numbers: dict[str, Any] = {"p": p, "p_absent": p_absent, "level": level}
     found = decide(effect, neutral=0.0, **numbers)
     if effect:
         assert decide(-effect, neutral=0.0, **numbers) == turned.get(found, found)
@@ -693,7 +693,7 @@ def test_judged_trials_are_those_of_the_file() -> None:
         parts += [rows(key, iterations=np.ones(n + 5)).assign(task=task) for key in keys]
     trials = judged_trials(pd.concat(parts), JUDGING)
     for (task, set), part in trials.groupby(["task", "set"]):
-        assert part["trial"].tolist() == list(range(JUDGING.trials[task]))  # type: ignore[index]
+        assert part["trial"].tolist() == list(range(JUDGING.trials[task]))
         assert set in (NONE, *EXPERIMENTS[str(task)].sets)
     assert len(trials.groupby(["task", "set"])) == 3 + 3 + 2
 

@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import math
 import pydoc
+from collections.abc import Collection
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from replication.demos.maze_expert import Expert
 from replication.demos.soccer_expert import SoccerExpert
 from replication.envs.soccer.rules import SoccerParams
 from replication.files import PROJECT
+from replication.irl import READINGS
+from replication.learning import reference
 from replication.paper import params
 from replication.paper.register import Choice, ChoiceError, Chosen, load_choices
 from replication.trials.measures import Report
@@ -60,6 +63,26 @@ def test_fields_and_entries_match() -> None:
         for field in dataclasses.fields(kind)
     }
     assert declared == {entry.field: entry.id for entry in ENTRIES if entry.field}
+
+
+def test_words_of_the_register_are_those_of_the_code() -> None:
+    """What a choice accepts is what the code that acts on it knows: no more and no less."""
+    known: dict[str, Collection[object]] = {
+        "ARITHMETIC": reference.ROUNDED,
+        "F-INDEX": READINGS,
+        "TIES": ("random", "first"),
+        "ROLLOUT-TIES": ("random", "first"),
+        "Q-START": ("kept", "reset"),
+        "W-START": ("zero", "uniform-0.001"),
+        "W-NORM": ("free", "unit"),
+        "GOAL-VALUE": ("zero", "bootstrap"),
+    }
+    for id, values in known.items():
+        entry = load_choices()[id]
+        assert {entry.default, *entry.alternatives} == {*values}, id
+    assert READINGS[0] == load_choices()["F-INDEX"].default
+    tolerances = load_choices()["TIE-TOLERANCE"]
+    assert all(0 <= float(value) < 1 for value in (tolerances.default, *tolerances.alternatives))
 
 
 def test_every_parameter_dataclass_is_checked() -> None:

@@ -253,6 +253,6 @@ def test_only_the_traced_trial_keeps_snapshots(condition: Condition, traced: boo
 
 def bits(trial: Trial) -> tuple[object, ...]:
     """Return all of a trial but its snapshots."""
-    arrays = [trial.errors, trial.weights, trial.q, trial.collisions, trial.values, trial.rewards]
-    arrays += sum(trial.episodes, ())
+    arrays: list[Any] = [trial.errors, trial.weights, trial.q]
+    arrays += [trial.collisions, trial.values, trial.rewards, *sum(trial.episodes, ())]
     return trial.converged, trial.steps, *(array.tobytes() for array in arrays)
