@@ -42,6 +42,8 @@ from replication.evidence.calibration import (
 from replication.evidence.claims import load_claims
 from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, GENERAL, NAMED
 from replication.evidence.statistics import mean_prediction, sd_prediction
+from replication.evidence.tables import read_table
+from replication.files import PROJECT
 from replication.irl.methods import TRACES
 from replication.paper.published import Published
 from replication.paper.register import load_choices
@@ -234,7 +236,7 @@ def test_nearest_by_hand() -> None:
         **dict(zip(world_points(b, "updated"), (0.5, 0.7, 0.2), strict=False)),
     }
     expected = {"printed": world_points(b, "printed")[1], "updated": world_points(b, "updated")[2]}
-    fitting = {world_points(a, "printed")[0]}
+    fitting = {world_points(a, "updated")[0]}  # the farthest: one is enough, wherever it is
     assert nearest(table_of(divergences, fitting)) == expected
     assert nearest(table_of(divergences, {*divergences})) == expected
 
@@ -448,3 +450,68 @@ def test_check_holds_new_trials_against_the_published_distribution() -> None:
     )
     without = check_table(trials[trials["part"] == "screen"], judged)
     assert without["trials"].tolist() == ["judging", "judging"]
+
+
+# --- what is published -----------------------------------------------------------------------
+
+FIGURES = PROJECT / "figures"
+
+
+@pytest.fixture(scope="module")
+def stored() -> dict[str, pd.DataFrame]:
+    """Read the published tables."""
+    folder = FIGURES / "calibration"
+    if not (folder / "final.csv").exists():
+        pytest.skip("the calibration in two stages is not published yet")
+    names = ("trials", "screen", "final", "savings", "check")
+    return {name: read_table(folder / f"{name}.csv") for name in names}
+
+
+def assert_alike(one: pd.DataFrame, other: pd.DataFrame) -> None:
+    """Assert that two tables are equal, to the digits of a file."""
+    pd.testing.assert_frame_equal(one, other, check_dtype=False, rtol=1e-8)
+
+
+def test_published_defaults_follow_from_the_published_trials(
+    stored: dict[str, pd.DataFrame],
+) -> None:
+    """From the trials to the register: points, finalists, and the defaults of both traces."""
+    screen, final = (calibration_table(stored["trials"], part) for part in ("screen", "final"))
+    assert_alike(stored["screen"], screen)
+    assert_alike(stored["final"], final)
+    assert set(screen["n"]) == {SCREEN_TRIALS}
+    assert set(final["n"]) == {FINAL_TRIALS}
+    assert len(screen) == len(points())
+    found = {tuple(row) for row in final[COLUMNS].itertuples(index=False)}
+    assert found == {*finalists(screen)}
+    assert rule_follows(final)
+    seeds = stored["trials"].groupby("part")["seed"].unique()
+    assert {part: own.tolist() for part, own in seeds.items()} == {
+        "screen": [SCREEN_SEED],
+        "final": [FINAL_SEED],
+        **({"fits": [FINAL_SEED]} if final["fits"].any() else {}),
+    }
+
+
+def test_published_savings_are_at_the_points_that_fit(stored: dict[str, pd.DataFrame]) -> None:
+    """Each point that fits has a row for each set, from its own trials."""
+    savings = savings_table(stored["trials"])
+    assert_alike(stored["savings"], savings)
+    fitting = stored["final"][stored["final"]["fits"]]
+    found = [tuple(row) for row in savings[COLUMNS].itertuples(index=False)]
+    assert {*found} == {tuple(row) for row in fitting[COLUMNS].itertuples(index=False)}
+    assert len(savings) == len(SETS) * len(fitting)
+
+
+def test_published_check_is_that_of_the_judging_run(stored: dict[str, pd.DataFrame]) -> None:
+    """The new trials are those that the claims are judged by."""
+    check = stored["check"][stored["check"]["trials"] == "judging"]
+    verdicts = read_table(FIGURES / "claims" / "verdicts.csv")
+    assert check["reading"].tolist() == list(TRACES)
+    names = ["effect", "low", "high", "predicted_low", "predicted_high"]
+    for id, own in (
+        ("MEAN-UNIFIED-OPEN", ["mean", "low", "high", "predicted_low", "predicted_high"]),
+        ("SD-UNIFIED-OPEN", ["sd", "sd_low", "sd_high", "sd_predicted_low", "sd_predicted_high"]),
+    ):
+        expected = verdicts[verdicts["id"] == id][names].to_numpy(float)
+        np.testing.assert_allclose(check[own].to_numpy(float), expected, rtol=1e-8)

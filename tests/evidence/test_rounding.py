@@ -28,6 +28,8 @@ from replication.evidence.rounding import (
     variants,
 )
 from replication.evidence.statistics import holm, mean_interval, sign_flip_p
+from replication.evidence.tables import read_table
+from replication.files import PROJECT
 from replication.learning import qlearning
 from replication.learning.seeds import child, stream
 from replication.paper.register import load_choices
@@ -286,3 +288,20 @@ def test_gaps_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(table["tables"]) == {4}
     assert table["tied"].tolist() == [0.5, 0.5] * 3
     assert table["rounded"].tolist() == [0.0, 0.5] * 3
+
+
+# --- what is published -----------------------------------------------------------------------
+
+
+def test_published_tolerance_follows_from_the_published_trials() -> None:
+    """From the trials to the register: the table, and the tolerance that the rule takes."""
+    folder = PROJECT / "figures" / "rounding"
+    if not (folder / "rounding.csv").exists():
+        pytest.skip("figures/rounding is not published yet")
+    trials, stored = (read_table(folder / f"{name}.csv") for name in ("trials", "rounding"))
+    table = rounding_table(trials)
+    pd.testing.assert_frame_equal(stored, table, check_dtype=False, rtol=1e-8)
+    assert set(trials["seed"]) == {ROOT}
+    assert len(table) == 6 * 15
+    assert set(table["n"]) == {TRIALS}
+    assert chosen_tolerance(table) == TOLERANCE

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from replication import Demos
+from replication.demos.model import Demo
 from replication.irl import READINGS, get_method, run_trial, unified
 from replication.irl.expectations import expert_expectations, visited
 from replication.paper.params import Params, Update
@@ -141,28 +142,43 @@ def test_readings_differ_by_their_trace_alone(
     np.testing.assert_array_equal(moved["at-once"], expected)
 
 
+def digest_of(
+    demos: Demos, method: str, reading: str, seed: int, *, shown: tuple[Demo, ...] = ()
+) -> str:
+    """Return the digest of a whole trial with these incorrect demonstrations."""
+    params = Params.of(episodes=60, horizon=40, max_iterations=30, f_index=reading)
+    agent = make_agent(demos.environment, params)
+    mu_e = expert_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
+    mu_b = visited(shown, shape=agent.shape)
+    root = np.random.SeedSequence(seed)
+    return digest(run_trial(agent, get_method(method), mu_e, mu_b, params, seed=root))
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_at_once_is_printed_without_incorrect_demonstrations(small_demos: Demos, seed: int) -> None:
     """Identity: with nothing marked, whole trials of both readings have the same bits."""
-    choices = {"episodes": 60, "horizon": 40, "max_iterations": 30}
-    shape = small_demos.environment.n_states, small_demos.environment.n_actions
-    mu_e = expert_expectations(small_demos.correct, gamma=0.9, shape=shape)
-    digests = {}
-    for reading in READINGS:
-        for shown in ((), small_demos.incorrect):
-            params = Params.of(**choices, f_index=reading)
-            trial = run_trial(
-                make_agent(small_demos.environment, params),
-                get_method("unified-incorrect"),
-                mu_e,
-                visited(shown, shape=shape),
-                params,
-                seed=np.random.SeedSequence(seed),
-            )
-            digests[reading, bool(shown)] = digest(trial)
-    assert digests["at-once", False] == digests["printed", False]
-    assert digests["at-once", True] != digests["printed", True]
-    assert len(set(digests.values())) == 5
+    found = {
+        (reading, bool(shown)): digest_of(
+            small_demos, "unified-incorrect", reading, seed, shown=shown
+        )
+        for reading in READINGS
+        for shown in ((), small_demos.incorrect)
+    }
+    assert found["at-once", False] == found["printed", False]
+    assert found["at-once", True] != found["printed", True]
+    assert len(set(found.values())) == 5
+
+
+@pytest.mark.parametrize("reading", READINGS)
+def test_algorithm_2_is_algorithm_1_without_incorrect_demonstrations(
+    small_demos: Demos, reading: str
+) -> None:
+    """Identity: whole trials of both methods have the same bits, and not with any marked pair."""
+    one = digest_of(small_demos, "unified", reading, 3)
+    assert digest_of(small_demos, "unified-incorrect", reading, 3) == one
+    shown = small_demos.incorrect
+    assert digest_of(small_demos, "unified", reading, 3, shown=shown) == one
+    assert digest_of(small_demos, "unified-incorrect", reading, 3, shown=shown) != one
 
 
 @given(visits, marks)

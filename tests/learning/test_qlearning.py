@@ -255,39 +255,29 @@ def test_single_holds_no_large_numbers(arrays: dict[str, Any]) -> None:
 # --- by hand ---------------------------------------------------------------------------------
 
 
-def test_collisions_by_hand() -> None:
+@pytest.mark.parametrize("learn", [qlearning.learn, reference.learn], ids=["fast", "plain"])
+def test_collisions_by_hand(learn: Any) -> None:
     """In a corridor from which nothing leads back, each step that stays is a collision."""
-    # Action 0 stays, action 1 moves on; staying in 0 and 1 is preferred until it has been tried.
-    next_state = [[0, 1], [1, 2], [2, 2]]
-    q = [[2.0, 1.0], [2.0, 1.0], [0.0, 0.0]]
-    task: dict[str, Any] = {"start": 0, "goal": 2, "beta": 1.0, "gamma": 0.0, "epsilon": 0.0}
-    zero = np.zeros((3, 2))
+    task: dict[str, Any] = {"start": 0, "beta": 1.0, "gamma": 0.0, "epsilon": 0.0}
+    words = make_stream(1).tolist() if learn is reference.learn else make_stream(1)
 
-    def run(episodes: int, horizon: int) -> tuple[int, ...]:
-        options = task | {"episodes": episodes, "horizon": horizon}
-        return qlearning.learn(next_state, zero, q, make_stream(1), **options)[2:]
+    def run(next_state: list[list[int]], q: list[list[float]], **options: int) -> tuple[int, int]:
+        zeros = [[0.0] * len(row) for row in q]
+        steps, collisions = learn(next_state, zeros, q, words, **task, **options)[2:]
+        return steps, collisions
 
-    # Stays in 0 (worth 0 from now on), moves to 1, stays there, moves to the goal: 4 steps, 2 hits.
-    assert run(1, 9) == (4, 2)
-    assert run(1, 3) == (3, 2)
-    assert run(1, 1) == (1, 1)
-    # Staying for ever: nothing is ever learned, and every step is a collision.
-    stays = qlearning.learn(
-        [[0]],
-        [[0.0]],
-        [[0.0]],
-        make_stream(1),
-        **task | {"goal": 0} | {"episodes": 3, "horizon": 7},
-    )
-    assert stays[2:] == (3, 3)  # the goal is where it is, so that each episode ends at once
-    loop = qlearning.learn(
-        [[0], [1]],
-        np.zeros((2, 1)),
-        np.zeros((2, 1)),
-        make_stream(1),
-        **task | {"goal": 1, "episodes": 3, "horizon": 7},
-    )
-    assert loop[2:] == (21, 21)
+    # Action 0 stays, action 1 moves on; staying is preferred until it has been tried: it stays in
+    # cell 0, moves to cell 1, stays there, and moves to the goal.
+    corridor, q = [[0, 1], [1, 2], [2, 2]], [[2.0, 1.0], [2.0, 1.0], [0.0, 0.0]]
+    assert run(corridor, q, goal=2, episodes=1, horizon=9) == (4, 2)
+    assert run(corridor, q, goal=2, episodes=1, horizon=3) == (3, 2)
+    assert run(corridor, q, goal=2, episodes=1, horizon=1) == (1, 1)
+    # In a dead end, where nothing is learned after the first step, all steps are collisions.
+    assert run([[0], [1]], [[0.0], [0.0]], goal=1, episodes=3, horizon=7) == (21, 21)
+    # A goal that is at the start ends each episode after its first step, which stays there.
+    assert run([[0]], [[0.0]], goal=0, episodes=3, horizon=7) == (3, 3)
+    # Back and forth, nothing is run into.
+    assert run([[1], [0], [2]], [[0.0]] * 3, goal=2, episodes=3, horizon=7) == (21, 0)
 
 
 def test_worked_example() -> None:
