@@ -31,6 +31,7 @@ READ = (
     *("running", "demonstrations", "architecture", "api/index", "cite"),
     *PLAYERS,
     *("notebooks/method", "notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
+    *("notebooks/rounding", "round_1"),
 )
 """Every page that is written for readers; others list code."""
 

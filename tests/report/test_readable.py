@@ -147,17 +147,23 @@ def test_readable_sets_by_hand() -> None:
 
 
 def test_readable_kinds_by_hand() -> None:
-    """A kind has one row, and the head says of how many wrong trajectories the shares are."""
+    """A kind has one row: its share of the wrong trajectories, and of the wrong visits."""
     kinds = table(
-        "reading kind trajectories taken share",
-        ("printed", "hit", 200, 1, 0.005),
-        ("printed", "opposite", 200, 120, 0.6),
-        ("updated", "hit", 100, 0, 0.0),
-        ("updated", "opposite", 100, 50, 0.5),
+        "reading kind trajectories share weight",
+        ("printed", "hit", 200, 0.005, 0.001),
+        ("printed", "opposite", 200, 0.6, 0.9),
+        ("updated", "hit", 100, 0.0, 0.0),
+        ("updated", "opposite", 100, 0.5, 0.8),
     )
     readable = readable_kinds(kinds)
-    assert readable.columns.tolist() == ["Kind", "Fᵢ (printed), of 200", "Fᵢ₊₁ (updated), of 100"]
-    assert shown(readable) == ["hit | 0.5% | 0.0%", "opposite | 60.0% | 50.0%"]
+    assert readable.columns.tolist() == [
+        *("Kind", "Fᵢ (printed): of trajectories", "Fᵢ (printed): of wrong visits"),
+        *("Fᵢ₊₁ (updated): of trajectories", "Fᵢ₊₁ (updated): of wrong visits"),
+    ]
+    assert shown(readable) == [
+        "hit | 0.5% | 0.1% | 0.0% | 0.0%",
+        "opposite | 60.0% | 90.0% | 50.0% | 80.0%",
+    ]
 
 
 # --- judged claims ---------------------------------------------------------------------------
