@@ -20,27 +20,23 @@ from replication.evidence.calibration import (
     POINTS,
     SCREEN_SEED,
     SCREEN_TRIALS,
-    SETS,
     TRACE,
     WORLD,
     WORLDS,
     Point,
     calibration_table,
-    check_table,
     chosen,
     condition,
-    declared_condition,
     finalists,
     kl_divergence,
     nearest,
     points,
     rule_follows,
-    savings_table,
     stages,
     worlds,
 )
 from replication.evidence.claims import load_claims
-from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, GENERAL, NAMED
+from replication.evidence.experiments import EXPERIMENTS
 from replication.evidence.statistics import mean_prediction, sd_prediction
 from replication.evidence.tables import read_table
 from replication.files import PROJECT
@@ -141,14 +137,10 @@ def test_points_do_not_depend_on_the_defaults(monkeypatch: pytest.MonkeyPatch) -
     assert points.__wrapped__() == before
 
 
-def test_chosen_points_are_the_defaults_of_each_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    """F_i has the register's values, F_(i+1) its own ALPHA and F-START, in the same world."""
-    register = load_choices()
-    defaults = tuple(register[id].default for id in (*WORLD, *TRACE))
-    assert chosen("printed") == (*defaults, "printed")
-    monkeypatch.setattr(calibration, "CALIBRATED", {"updated": {"alpha": 0.9, "f_start": 0.1}})
-    assert chosen("updated") == (*defaults[:3], 0.9, 0.1, "updated")
-    assert chosen("printed") == (*defaults, "printed")
+def test_chosen_points_are_the_plainest() -> None:
+    """No point fits, so both traces have the register's values, which are the plainest point's."""
+    for trace in TRACES:
+        assert chosen(trace) == (*PLAINEST, trace)
 
 
 def test_chosen_points_are_those_of_the_experiments() -> None:
@@ -157,23 +149,21 @@ def test_chosen_points_are_those_of_the_experiments() -> None:
     for trace in TRACES:
         ours, theirs = condition(chosen(trace)), own["unified", trace, "none"]
         assert trial_key(ours, 1, 2) == trial_key(theirs, 1, 2)
-        assert set(CALIBRATED) <= {"updated"}
 
 
 def test_condition_of_a_point() -> None:
     """It is the unified method on the open maze with the point's six values, all else default."""
     for point in points()[::37]:
         leg, ties, q_start, alpha, f_start, trace = point
-        for method, set in (("unified", "none"), ("unified-incorrect", GENERAL)):
-            made = condition(point, method, set)
-            changed = made.params.differences()
-            assert changed.keys() <= {*WORLD[1:], *TRACE, "F-INDEX", "INCORRECT-KINDS"}
-            learner, update = made.params.learner, made.params.update
-            assert (learner.ties, learner.q_start) == (ties, q_start)
-            assert (update.alpha, update.f_start, update.f_index) == (alpha, f_start, trace)
-            expected = {"task": "open-maze", "method": method, "reading": trace, "set": set}
-            assert factors(made) == expected
-            assert made.demos.correct == condition((leg, *chosen("printed")[1:])).demos.correct
+        made = condition(point)
+        changed = made.params.differences()
+        assert changed.keys() <= {*WORLD[1:], *TRACE, "F-INDEX"}
+        learner, update = made.params.learner, made.params.update
+        assert (learner.ties, learner.q_start) == (ties, q_start)
+        assert (update.alpha, update.f_start, update.f_index) == (alpha, f_start, trace)
+        expected = {"task": "open-maze", "method": "unified", "reading": trace, "set": "none"}
+        assert factors(made) == expected
+        assert made.demos.correct == condition((leg, *chosen("printed")[1:])).demos.correct
     assert len({condition(point).demos.correct for point in points()}) == 5
 
 
@@ -323,32 +313,11 @@ def test_border_of_what_fits(off: float) -> None:
         assert table["fits"].tolist() == [off < 0]
 
 
-def test_savings_are_against_the_same_point() -> None:
-    """What a set saves is from the finalist's own trials, with the same seeds, in their order."""
-    rng = np.random.default_rng(4)
-    base = {k: sample(40 + k, 5, 30, seed=k) for k in (10, 11)}
-    parts = [trials_of("final", k, counts) for k, counts in base.items()]
-    due = {}
-    for k, counts in base.items():
-        for place, set in enumerate(SETS):
-            saved = 3 * k + place + rng.normal(size=30)
-            due[k, set] = saved
-            parts.append(trials_of("fits", len(SETS) * k + place, counts - saved))
-    trials = pd.concat(parts).sample(frac=1.0, random_state=1)
-    table = savings_table(trials)
-    assert SETS == (NAMED, GENERAL)
-    assert table["set"].tolist() == [*SETS, *SETS]
-    for row in table.to_dict("records"):
-        saved = due[points().index(tuple(row[id] for id in COLUMNS)), row["set"]]
-        assert (row["n"], row["saved"]) == (30, pytest.approx(saved.mean()))
-        assert row["low"] < row["saved"] < row["high"]
-
-
 # --- what is run -----------------------------------------------------------------------------
 
 
 def test_calibration_is_apart_from_the_judging_run() -> None:
-    """Its root seeds are known ones, and what it used gets no verdict."""
+    """Its root seeds are known ones; it chose nothing, so the pair is judged."""
     judging = load_claims().judging
     known = {seed for run in load_claims().known for seed in run.root_seeds}
     assert (SCREEN_SEED, FINAL_SEED) == (21, 22)
@@ -356,14 +325,14 @@ def test_calibration_is_apart_from_the_judging_run() -> None:
     assert judging.root_seed not in (SCREEN_SEED, FINAL_SEED)
     for id in ("MEAN-UNIFIED-OPEN", "SD-UNIFIED-OPEN"):
         claim = load_claims().by_id(id)
-        assert "calibrated" in claim.used
+        assert not claim.used
         assert claim.published("unified").mean == PAIR.mean
 
 
 def test_stages_are_as_the_register_says() -> None:
-    """All points with 10 trials; 40 finalists with 200; the sets at each finalist that fits."""
-    (one, screen), (two, final), (three, fits) = stages()
-    assert (one, two, three) == (SCREEN_SEED, FINAL_SEED, FINAL_SEED)
+    """All points with 10 trials; then 40 finalists with 200."""
+    (one, screen), (two, final) = stages()
+    assert (one, two) == (SCREEN_SEED, FINAL_SEED)
     first = screen(pd.DataFrame())
     assert len(first) == len(points())
     assert {group.trials for group in first} == {SCREEN_TRIALS} == {10}
@@ -380,76 +349,21 @@ def test_stages_are_as_the_register_says() -> None:
     expected = [points().index(p) for p in finalists(calibration_table(trials, "screen"))]
     assert [group.labels["number"] for group in second] == expected
     assert {group.trials for group in second} == {FINAL_TRIALS} == {200}
-    means = {number: PAIR.mean + 5 * (place % 10 > 0) for place, number in enumerate(expected)}
-    finals = [trials_of("final", k, sample(mean, PAIR.sd, 200)) for k, mean in means.items()]
-    third = fits(pd.concat([trials, *finals]))
-    fitting = {number for number, mean in means.items() if mean == PAIR.mean}
-    assert len(fitting) == 4
-    assert {group.labels["number"] for group in third} == {
-        len(SETS) * number + place for number in fitting for place in range(len(SETS))
-    }
-    assert {(group.labels["part"], group.trials) for group in third} == {("fits", 200)}
-    for group in (*first[::100], *second[::10], *third):
+    for group in (*first[::100], *second[::10]):
         (own,) = group.conditions
-        again = declared_condition(str(group.labels["part"]), int(group.labels["number"]))
+        again = condition(points()[int(group.labels["number"])])
         assert trial_key(again, 1, 2) == trial_key(own, 1, 2)
-        uses = group.labels["part"] == "fits"
-        assert own.method == ("unified-incorrect" if uses else "unified")
+        assert own.method == "unified"
 
 
 def test_trials_of_the_stages_can_be_fewer() -> None:
     """A quick look has fewer trials of each condition."""
-    (_, screen), (_, final), _ = stages(screen_trials=2, final_trials=3)
+    (_, screen), (_, final) = stages(screen_trials=2, final_trials=3)
     assert {group.trials for group in screen(pd.DataFrame())} == {2}
     table = pd.concat(
         trials_of("screen", k, sample(40, 1 + k % 7, 10)) for k in range(len(points()))
     )
     assert {group.trials for group in final(table)} == {3}
-
-
-# --- the check -------------------------------------------------------------------------------
-
-
-def test_check_holds_new_trials_against_the_published_distribution() -> None:
-    """A row for each trace and source: the finalist's trials, and the new ones of the method."""
-    draw = sample(PAIR.mean, PAIR.sd, 100)
-    parts = [
-        ("unified", "printed", draw),
-        ("unified", "updated", draw + 3),
-        ("unified-incorrect", "printed", draw + 9),
-        ("adaboost", "", draw + 20),
-    ]
-    judged = pd.concat(
-        pd.DataFrame({"method": m, "reading": f, "iterations": x, "converged": 1})
-        for m, f, x in parts
-    )
-    numbers = {trace: points().index(chosen(trace)) for trace in TRACES}
-    other = next(k for k in range(9) if k not in numbers.values())
-    final = {trace: draw[:30] + k for k, trace in enumerate(TRACES)}
-    trials = pd.concat(
-        [
-            trials_of("final", other, draw[30:60]),
-            trials_of("screen", numbers["printed"], draw[60:]),
-            *(trials_of("final", numbers[trace], counts) for trace, counts in final.items()),
-        ]
-    )
-    check = check_table(trials, judged)
-    assert check["reading"].tolist() == ["printed", "printed", "updated", "updated"]
-    assert check["trials"].tolist() == ["calibration", "judging"] * 2
-    assert check["n"].tolist() == [30, 100] * 2
-    assert check["mean"].tolist() == pytest.approx(
-        [final["printed"].mean(), PAIR.mean, final["updated"].mean(), PAIR.mean + 3]
-    )
-    for name, low, high in (("mean", "low", "high"), ("sd", "sd_low", "sd_high")):
-        assert ((check[low] < check[name]) & (check[name] < check[high])).all()
-    expected = mean_prediction(PAIR.mean, PAIR.sd, PAIR.n, 100)
-    assert check.loc[1, ["predicted_low", "predicted_high"]].tolist() == pytest.approx(expected)
-    expected = sd_prediction(PAIR.sd, PAIR.n, draw)
-    assert check.loc[1, ["sd_predicted_low", "sd_predicted_high"]].tolist() == pytest.approx(
-        expected
-    )
-    without = check_table(trials[trials["part"] == "screen"], judged)
-    assert without["trials"].tolist() == ["judging", "judging"]
 
 
 # --- what is published -----------------------------------------------------------------------
@@ -463,7 +377,7 @@ def stored() -> dict[str, pd.DataFrame]:
     folder = FIGURES / "calibration"
     if not (folder / "final.csv").exists():
         pytest.skip("the calibration in two stages is not published yet")
-    names = ("trials", "screen", "final", "savings", "check")
+    names = ("trials", "screen", "final")
     return {name: read_table(folder / f"{name}.csv") for name in names}
 
 
@@ -486,32 +400,5 @@ def test_published_defaults_follow_from_the_published_trials(
     assert found == {*finalists(screen)}
     assert rule_follows(final)
     seeds = stored["trials"].groupby("part")["seed"].unique()
-    assert {part: own.tolist() for part, own in seeds.items()} == {
-        "screen": [SCREEN_SEED],
-        "final": [FINAL_SEED],
-        **({"fits": [FINAL_SEED]} if final["fits"].any() else {}),
-    }
-
-
-def test_published_savings_are_at_the_points_that_fit(stored: dict[str, pd.DataFrame]) -> None:
-    """Each point that fits has a row for each set, from its own trials."""
-    savings = savings_table(stored["trials"])
-    assert_alike(stored["savings"], savings)
-    fitting = stored["final"][stored["final"]["fits"]]
-    found = [tuple(row) for row in savings[COLUMNS].itertuples(index=False)]
-    assert {*found} == {tuple(row) for row in fitting[COLUMNS].itertuples(index=False)}
-    assert len(savings) == len(SETS) * len(fitting)
-
-
-def test_published_check_is_that_of_the_judging_run(stored: dict[str, pd.DataFrame]) -> None:
-    """The new trials are those that the claims are judged by."""
-    check = stored["check"][stored["check"]["trials"] == "judging"]
-    verdicts = read_table(FIGURES / "claims" / "verdicts.csv")
-    assert check["reading"].tolist() == list(TRACES)
-    names = ["effect", "low", "high", "predicted_low", "predicted_high"]
-    for id, own in (
-        ("MEAN-UNIFIED-OPEN", ["mean", "low", "high", "predicted_low", "predicted_high"]),
-        ("SD-UNIFIED-OPEN", ["sd", "sd_low", "sd_high", "sd_predicted_low", "sd_predicted_high"]),
-    ):
-        expected = verdicts[verdicts["id"] == id][names].to_numpy(float)
-        np.testing.assert_allclose(check[own].to_numpy(float), expected, rtol=1e-8)
+    used = {part: own.tolist() for part, own in seeds.items()}
+    assert used == {"screen": [SCREEN_SEED], "final": [FINAL_SEED]}

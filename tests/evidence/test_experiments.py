@@ -7,9 +7,7 @@ import pytest
 
 from replication import Demos
 from replication.errors import UserError
-from replication.evidence import experiments
 from replication.evidence.experiments import (
-    CALIBRATED,
     EXPERIMENTS,
     GENERAL,
     NAMED,
@@ -79,22 +77,6 @@ def test_choices_reach_every_setting(small_demos: Demos) -> None:
     for name, value in (("f_index", "updated"), ("incorrect", "hit")):
         with pytest.raises(ChoiceError, match=f"choices: {name} is run in every way"):
             conditions_of(small_demos, {name: value})
-
-
-def test_calibrated_choices_are_those_of_their_reading(
-    small_demos: Demos, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """ALPHA and F-START belong to a trace: F_(i+1) has its own unless told otherwise."""
-    assert CALIBRATED.keys() <= {"updated"}  # the defaults are those of F_i, and so of at-once
-    assert {name for own in CALIBRATED.values() for name in own} <= {"alpha", "f_start"}
-    monkeypatch.setattr(experiments, "CALIBRATED", {"updated": {"alpha": 0.9}})
-    usual = load_choices()["ALPHA"].default
-    for (_, reading, _), condition in conditions_of(small_demos, {}).items():
-        expected = 0.9 if reading == "updated" else usual
-        assert condition.params.update.alpha == expected
-    for condition in conditions_of(small_demos, {"alpha": 0.1}).values():
-        assert condition.params.update.alpha == 0.1
-    assert condition_of("open-maze", "unified", "updated", NONE).params.update.alpha == 0.9
 
 
 def test_sets_without_their_kinds_are_left_out(small_demos: Demos) -> None:

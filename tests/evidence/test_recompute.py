@@ -171,11 +171,11 @@ def test_a_changed_stored_trial_is_found(table: Path) -> None:
 def planned() -> list[Group]:
     """Return some groups of every notebook that has a table of parts."""
     (_, screen), *_ = calibration.stages(screen_trials=1)
-    fits = calibration.declared_condition("fits", 77)
+    finalist = calibration.condition(calibration.points()[77])
     return [
         *sweep.plan(most_trials=1, most_specifications=3),
         *screen(pd.DataFrame())[:3],
-        Group([fits], 1, {"part": "fits", "number": 77}),
+        Group([finalist], 1, {"part": "final", "number": 77}),
         *rounding.plan(1)[:4],
     ]
 
@@ -185,7 +185,7 @@ def test_conditions_of_all_parts_come_back() -> None:
     groups = planned()
     assert {group.labels["part"] for group in groups} == {
         *sweep.TRIALS,
-        *("screen", "fits", "rounding"),
+        *("screen", "final", "rounding"),
     }
     for group in groups:
         table = planned_table([group], 7)

@@ -9,7 +9,7 @@ import pytest
 
 from replication import Demos, Maze, load_demos
 from replication.envs.maze import as_maze
-from replication.evidence.experiments import CALIBRATED, EXPERIMENTS, Key
+from replication.evidence.experiments import EXPERIMENTS, Key
 from replication.evidence.specifications import (
     MAPS,
     RANDOM,
@@ -52,11 +52,9 @@ def expert_choices(one: Specification) -> set[str]:
     return {id for id, _ in one.choices} & {"MAP", "DEMO-SHAPE", "DEMO-PATH", "DETOUR-WIDTH"}
 
 
-def calibrated(reading: str) -> dict[str, Any]:
-    """Return what differs from the defaults under a reading of Eq. 9: itself, and its own rates."""
-    own = {"alpha": "ALPHA", "f_start": "F-START"}
-    rates = {own[name]: value for name, value in CALIBRATED.get(reading, {}).items()}
-    return ({"F-INDEX": reading} if reading not in ("", "printed") else {}) | rates
+def chosen_reading(reading: str) -> dict[str, Any]:
+    """Return what differs from the defaults under a reading of Eq. 9: itself, if it is another."""
+    return {"F-INDEX": reading} if reading not in ("", "printed") else {}
 
 
 # --- what a specification changes ------------------------------------------------------------
@@ -125,7 +123,7 @@ def test_single_specification_changes_one_choice(
             if id == "INCORRECT-KINDS" and method != "unified-incorrect":
                 expected = {}
             if id == "F-INDEX":
-                expected = calibrated(f)
+                expected = chosen_reading(f)
             assert changed == {"ITERATION-CAP": CAP, **expected}
             assert condition.demos == other.demos
 
@@ -154,7 +152,7 @@ def test_soccer_specification_changes_one_choice(one: Specification) -> None:
     elsewhere = choices.pop("SOCCER-INCORRECT", None)
     for (_, f, given), condition in conditions.items():
         assert (condition.demos.incorrect != base.demos.incorrect) == bool(elsewhere or world)
-        expected = {**usual, **calibrated(f), **choices, "INCORRECT-KINDS": given}
+        expected = {**usual, **chosen_reading(f), **choices, "INCORRECT-KINDS": given}
         assert condition.params.differences() == expected
         theirs, ours = base.demos.environment, condition.demos.environment
         assert (theirs.params != ours.params) == bool(world)  # type: ignore[attr-defined]
@@ -258,8 +256,7 @@ def test_ablations_of_the_trace() -> None:
     for (method, reading, changed), condition in conditions.items():
         update = condition.params.update
         assert (condition.method, update.f_index) == (method, reading)
-        own = CALIBRATED.get(reading, {})
-        usual = own.get("alpha", default_of("ALPHA")), own.get("f_start", default_of("F-START"))
+        usual = default_of("ALPHA"), default_of("F-START")
         expected = {
             "default": usual,
             "ALPHA=0.0 F-START=1.0": (0.0, 1.0),
@@ -356,5 +353,5 @@ def test_numbered_settings_differ_in_demonstrations_alone(
         assert condition.params.update.f_index == f
         changed = condition.params.differences()
         assert changed.pop("INCORRECT-KINDS") == ("all" if number else "none")
-        assert changed == {"ITERATION-CAP": CAP, **calibrated(f)}
+        assert changed == {"ITERATION-CAP": CAP, **chosen_reading(f)}
         assert condition.demos.correct == numbered[0, "printed"].demos.correct

@@ -39,7 +39,10 @@ OF_ALL = [
     *("iterations", "converged", "early_collisions", "early_errors"),
     *("q_growth", "reward_growth", "acted", "acted_at_first"),
 ]
-NAMES = [*OF_ALL, "with_hit", "with_detour", "with_opposite"]
+NAMES = [
+    *OF_ALL,
+    *(f"{what}_{kind}" for what in ("with", "visits") for kind in ("hit", "detour", "opposite")),
+]
 
 
 def episode(*moves: tuple[int, int, bool]) -> Episode:
@@ -80,7 +83,8 @@ def measured(
 ) -> dict[str, float]:
     """Measure a made-up trial, given the pairs that its method was shown."""
     kinds = kind_pairs(demos)
-    return measure(trial, demos, kinds, pairs_of(demos, *shown), report or Report())
+    pairs = pairs_of(demos, *shown)
+    return measure(trial, demos, kinds, pairs, report or Report(), gamma=0.5)
 
 
 # --- the initial phase -----------------------------------------------------------------------
@@ -197,6 +201,18 @@ def test_kinds_are_counted_by_trajectory(small_demos: Demos) -> None:
     assert (found["with_hit"], found["with_opposite"]) == (2, 3)
     assert found["with_detour"] == 2 * kinds["detour"][hits[0]]
     assert list(found) == NAMES
+
+
+def test_visits_are_discounted_and_wrong_pairs_counted_once(small_demos: Demos) -> None:
+    """Half of the weight of the move before, in each trajectory; what the expert does is right."""
+    demo = small_demos.correct[0]
+    right = (int(demo.states[0]), int(demo.actions[0]), False)
+    (state, action), *_ = np.argwhere(kind_pairs(small_demos)["opposite"]).tolist()
+    turn = (state, action, False)
+    episodes = (episode(turn, turn), episode(right, turn, turn), episode(turn, right))
+    found = measured(made(small_demos, iterations=2, episodes=episodes), small_demos)
+    assert (found["wrong_pairs"], found["with_opposite"]) == (2, 2)
+    assert found["wrong_visits"] == found["visits_opposite"] == (0.5 + 0.25) + 1.0
 
 
 # --- growth ----------------------------------------------------------------------------------
