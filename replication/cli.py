@@ -13,7 +13,6 @@ import math
 import os
 import re
 import secrets
-import shlex
 import shutil
 import signal
 import sys
@@ -21,7 +20,7 @@ import tempfile
 import textwrap
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
@@ -256,7 +255,7 @@ def run(
             click.echo(error.details if sys.stderr.isatty() else plain, err=True)
         _end(str(error), 1)
     except UserError as error:
-        _end(f"{error}{_example(str(error), parameters)}")
+        _end(str(error))
     new = [file for notebook in published for file in notebook.files]
     for table in new:
         if table.suffix == ".md" and table.parent.name != "claims":
@@ -291,15 +290,6 @@ CHECKS: dict[str, Callable[[], object]] = {
     "replication/evidence/specifications.toml": _check_specifications,
 }
 """What is checked before a notebook runs that reads one of these files."""
-
-
-def _example(message: str, parameters: Mapping[str, Any]) -> str:
-    """Show how to take the kinds that a file has, if it lacks one that was asked for."""
-    if "has no incorrect demo of kind" not in message:
-        return ""
-    given = parameters.get("choices", {})
-    choices = {**(given if isinstance(given, dict) else {}), "incorrect": "all"}
-    return f", such as -p choices {shlex.quote(json.dumps(choices))}"
 
 
 @app.command(epilog="Example: replicate draw fig05")

@@ -316,21 +316,6 @@ def test_every_check_is_of_a_file() -> None:
         assert (files.PROJECT / name).exists()
 
 
-def test_missing_kind_comes_with_a_way_out(project: Path, demo_file: Path) -> None:
-    """The option that takes the kinds of a file is shown, beside the choices that were made."""
-    path = project / "notebooks" / "toy.ipynb"
-    node = nbformat.read(path, as_version=4)
-    node.cells[0].source += "\nchoices = {}"
-    code = f"from replication import load_demos\nload_demos({str(demo_file)!r}).select('late')"
-    node.cells[1].source = code
-    nbformat.write(node, path)
-    for words, shown in (
-        ([], '{"incorrect": "all"}'),
-        (["-p", "choices", '{"alpha": 0.1}'], '{"alpha": 0.1, "incorrect": "all"}'),
-    ):
-        assert refused("run", *words, late=True).endswith(f", such as -p choices '{shown}'\n")
-
-
 # --- status, verify and clean ----------------------------------------------------------------
 
 

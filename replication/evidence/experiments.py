@@ -89,7 +89,7 @@ def conditions_of(
     """Return a condition for each method, reading of Eq. 9 and set of incorrect demonstrations.
 
     Sets with a kind that the demonstrations lack are left out; if nothing is left, all of the
-    demonstrations are one set.
+    incorrect demonstrations are one set, even if there are none.
 
     Raises
     ------
@@ -104,8 +104,7 @@ def conditions_of(
         for name in sets
         if name != NONE and (name == "all" or {*name.split("+")} <= {*demos.kinds})
     ]
-    if not shown and demos.kinds:
-        shown = ["all"]
+    shown = shown or ["all"]
     return {
         (name, reading, set): Condition(demos, name, _params(choices, reading, set))
         for name in methods

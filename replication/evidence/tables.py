@@ -172,18 +172,18 @@ def kinds_table(trials: pd.DataFrame) -> pd.DataFrame:
     own = trials[(trials["method"] == "unified") & (trials["converged"] == 1)]
     rows = []
     for reading, part in own.groupby("reading", sort=False):
-        wrong = int((part["iterations"] - 1).sum())
+        wrong, visits = int((part["iterations"] - 1).sum()), part["wrong_visits"].sum()
         for kind in kinds:
             rows.append(
                 {
                     "reading": reading,
                     "kind": kind,
                     "trajectories": wrong,
-                    "share": part[f"with_{kind}"].sum() / wrong,
-                    "weight": part[f"visits_{kind}"].sum() / part["wrong_visits"].sum(),
+                    "share": part[f"with_{kind}"].sum() / wrong if wrong else np.nan,
+                    "weight": part[f"visits_{kind}"].sum() / visits if visits else np.nan,
                 }
             )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["reading", "kind", "trajectories", "share", "weight"])
 
 
 def pairs_near(demos: Demos) -> dict[str, int]:

@@ -95,6 +95,11 @@ class Study(Outputs):
         own = [tables.rows_of(self.trials, each) for each in self.conditions.values()]
         return pd.concat([rows.head(self.number) for rows in own], ignore_index=True)
 
+    @property
+    def widest(self) -> str:
+        """The last of the judged sets of incorrect demonstrations that the file has."""
+        return [set for _, _, set in self.conditions][-1]
+
     def of(self, *methods: str) -> pd.DataFrame:
         """Return the rows of some methods' own trials."""
         return self.main[self.main["method"].isin(methods)].reset_index(drop=True)

@@ -120,4 +120,5 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
 
 
 def _places(readings: list[str]) -> NDArray[np.float64]:
-    return (np.arange(len(readings)) - (len(readings) - 1) / 2) * 0.8 / len(readings)
+    n = max(len(readings), 1)
+    return (np.arange(len(readings)) - (len(readings) - 1) / 2) * 0.8 / n

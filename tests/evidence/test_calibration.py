@@ -246,7 +246,11 @@ def test_rule_follows_if_the_defaults_are_nearest(monkeypatch: pytest.MonkeyPatc
     assert ALL_WORLDS[0] != chosen("printed")[:3]
     assert rule_follows(table_of(mine | other, {*mine}))
     assert not rule_follows(table_of(mine | dict.fromkeys(other, 0.05), {*mine}))
-    assert not rule_follows(table_of(mine | other))
+    nothing_fits = table_of(mine | other)
+    assert rule_follows(nothing_fits)
+    monkeypatch.setattr(calibration, "PLAINEST", other_world := (*ALL_WORLDS[0], 0.1, 0.1))
+    assert nearest(nothing_fits) == {trace: (*other_world, trace) for trace in TRACES}
+    assert not rule_follows(nothing_fits)
 
 
 # --- tables ----------------------------------------------------------------------------------

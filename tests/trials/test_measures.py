@@ -38,6 +38,7 @@ FEW = {"episodes": 100, "horizon": 40}
 OF_ALL = [
     *("iterations", "converged", "early_collisions", "early_errors"),
     *("q_growth", "reward_growth", "acted", "acted_at_first"),
+    *("wrong_pairs", "wrong_visits"),
 ]
 NAMES = [
     *OF_ALL,
