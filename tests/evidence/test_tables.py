@@ -55,6 +55,9 @@ def made(
             "acted_at_first": rng.integers(0, 99, n),
             "with_hit": rng.integers(0, 5, n),
             "with_opposite": rng.integers(0, 15, n),
+            "visits_hit": rng.random(n),
+            "visits_opposite": 9 * rng.random(n),
+            "wrong_visits": 10.0,
         }
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
@@ -229,10 +232,11 @@ def test_sets_are_compared_over_the_trials_of_both(small_demos: Demos) -> None:
 
 
 def test_kinds_by_hand(conditions: dict[Key, Condition]) -> None:
-    """In how many wrong trajectories a kind's pair is taken, where no incorrect ones are shown."""
+    """How many wrong trajectories take a kind's pair, and its part in the wrong visits."""
     trials = made(conditions)
     own = (trials["method"] == "unified") & (trials["reading"] == "printed")
-    trials.loc[own, ["iterations", "with_hit", "with_opposite"]] = [11, 2, 5]
+    names = ["iterations", "with_hit", "with_opposite", "visits_hit", "visits_opposite"]
+    trials.loc[own, [*names, "wrong_visits"]] = [11, 2, 5, 1.0, 6.0, 8.0]
     at = trials.index[own]
     trials.loc[at[0], ["iterations", "with_hit"]] = [1, 0]  # right after one update: none wrong
     trials.loc[at[1], "converged"] = 0  # at the cap: its last one is wrong, too
@@ -240,8 +244,8 @@ def test_kinds_by_hand(conditions: dict[Key, Condition]) -> None:
     assert {*table["reading"]} == {"printed", "updated"}
     printed = table[table["reading"] == "printed"].set_index("kind")
     assert (printed["trajectories"] == 38 * 10).all()
-    assert printed["taken"].to_dict() == {"hit": 38 * 2, "opposite": 38 * 5 + 5}
     assert printed["share"].to_dict() == {"hit": 76 / 380, "opposite": 195 / 380}
+    assert printed["weight"].to_dict() == {"hit": 1 / 8, "opposite": 6 / 8}
     trials["iterations"] = 1
     assert kinds_table(trials)["share"].isna().all()
 
