@@ -405,6 +405,12 @@ def test_comments_explain_every_measure_statistic_and_verdict() -> None:
         assert re.search(rf"^#   {verdict} ", head, flags=re.MULTILINE), verdict
 
 
+def test_criteria_are_the_frozen_ones() -> None:
+    """The hash is that of the commit that froze round II, before its first trial."""
+    frozen = "5c1db3f5f939773ef3ccace4b52f9667a2ff502b2d53cd579265d21c58eb6fc3"
+    assert criteria_hash() == frozen
+
+
 def test_published_verdicts_are_by_this_file() -> None:
     """The column `criteria` of the published verdicts is the hash of the file as it is."""
     path = PROJECT / "figures" / "claims" / "verdicts.csv"
