@@ -44,7 +44,7 @@ TESTED = ("saved", "sd-ratio", "mean")
 LABELS = {
     "FASTER": "faster than AdaBoost-IRL",
     "STEADIER": "steadier than AdaBoost-IRL",
-    "FASTER-WITH": "with incorrect: faster than AdaBoost-IRL",
+    "FASTER-WITH": "faster with incorrect ones",
     "SAVES-OPEN": "saves iterations, open maze",
     "SAVES-OBSTACLES": "saves iterations, obstacles",
     "SAVES-SOCCER": "saves iterations, soccer",
