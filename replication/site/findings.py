@@ -111,31 +111,29 @@ HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
 
 
 def _consistency(rows: pd.DataFrame) -> str:
-    """Say in which cells an effect is consistent with the paper's, and else in which direction.
+    """Say in which cells an effect is consistent with the paper's, and else in which direction."""
+    names = {"yes": "consistent with it", "larger": "larger", "smaller": "smaller"}
+    cells: dict[str, list[str]] = {}
+    for row in rows.itertuples():
+        reading = F_LABELS[row.reading].split(" (")[0]
+        cells.setdefault(_size(row), []).append(f"{reading}{PLACES.get(row.id, '')}")
+    parts = [f"{text} under {_listed(cells[key])}" for key, text in names.items() if key in cells]
+    return ", and ".join(parts)
 
-    A ratio of SDs counts as larger the farther it is from 1.
-    """
-    parts = []
-    names = {
-        "yes": "consistent with it",
-        "larger": "larger than that",
-        "smaller": "smaller than that",
-    }
-    sizes = [_size(row) for row in rows.itertuples()]
-    for kind, text in names.items():
-        cells = [row for row, size in zip(rows.itertuples(), sizes, strict=True) if size == kind]
-        if cells:
-            where = " and ".join(
-                f"{F_LABELS[row.reading].split(' (')[0]}{PLACES.get(row.id, '')}" for row in cells
-            )
-            parts.append(f"{text} under {where}")
-    return ", ".join(parts)
+
+def _listed(words: list[str]) -> str:
+    *most, last = words
+    return f"{'; '.join(most)} and {last}" if most else last
 
 
 PLACES = {"SAVES-OPEN": " (open)", "SAVES-OBSTACLES": " (obstacles)"}
 
 
 def _size(row: Any) -> str:
+    """Return "yes" if an effect is consistent with the paper's, or else what it is beside it.
+
+    A ratio of SDs is an effect the larger the farther it is below 1.
+    """
     if row.consistent != "no":
         return str(row.consistent)
     beyond = row.effect > row.predicted_high
