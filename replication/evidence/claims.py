@@ -22,7 +22,6 @@ from replication.evidence.experiments import EXPERIMENTS, NONE
 from replication.evidence.statistics import CONFIDENCE
 from replication.files import read_text
 from replication.irl import METHODS, get_method
-from replication.paper.published import Published
 from replication.source import bare_source
 
 FILE = Path(__file__).with_name("claims.toml")
@@ -162,10 +161,6 @@ class Claim(Strict):
         method = get_method(self.x)
         sets = EXPERIMENTS[self.task].sets if method.uses_incorrect else (NONE,)
         return [(reading, set) for set in sets for reading in method.readings]
-
-    def published(self, method: str) -> Published:
-        """Return the published numbers of a method."""
-        return Published(self.place, *self.paper[method])
 
     @property
     def paper_effect(self) -> float:
