@@ -211,7 +211,7 @@ def test_criteria_do_not_change_with_words(edited: Edit, name: str, old: str, ne
         ('id = "FASTER"', 'id = "STEADIER"', ["'STEADIER' is there twice"]),
         ('prediction = "shown in all cells"', "", ["claim FASTER-WITH: needs a prediction, or"]),
         ('prediction = "shown in all cells"', 'prediction = ""', ["claim FASTER-WITH: needs a"]),
-        ('used = "the', 'prediction = "x"\nused = "the', ["claim MEAN-UNIFIED-OPEN: needs a pr"]),
+        ('used = "rec', 'prediction = "x"\nused = "rec', ["claim MEAN-ADABOOST-OPEN: needs a p"]),
         ("root_seed = 4051", "root_seed = 2026", ["root seed 2026 was used before"]),
         ("root_seed = 4051", "root_seed = 13", ["root seed 13 was used before"]),
         ("root_seed = 4051", "root_seed = -1", ["judging.root_seed", "greater", "not -1"]),
@@ -367,9 +367,9 @@ def test_margin_in_soccer_is_a_quarter_as_in_the_tables() -> None:
 
 
 def test_what_was_used_is_not_judged() -> None:
-    """The calibrated pair, and the mean by which R1 was chosen: these three numbers and no more."""
+    """The mean by which R1 was chosen: this number and no more."""
     used = {claim.id for claim in CLAIMS if claim.used}
-    assert used == {"MEAN-UNIFIED-OPEN", "SD-UNIFIED-OPEN", "MEAN-ADABOOST-OPEN"}
+    assert used == {"MEAN-ADABOOST-OPEN"}
     assert all(claim.prediction for claim in CLAIMS if not claim.used)
 
 

@@ -190,7 +190,14 @@ def made(counts: dict[tuple[Any, float, str], Any]) -> pd.DataFrame:
     """Make trials up, in any order."""
     places = {key: number for number, key in enumerate(conditions())}
     parts = [
-        pd.DataFrame({"number": places[key], "trial": np.arange(len(each)), "iterations": each})
+        pd.DataFrame(
+            {
+                "number": places[key],
+                "trial": np.arange(len(each)),
+                "iterations": each,
+                "wrong_pairs": 3 * (each - 1),
+            }
+        )
         for key, each in counts.items()
     ]
     return pd.concat(parts).sample(frac=1.0, random_state=1)
@@ -217,6 +224,7 @@ def test_table_by_hand() -> None:
         d = own - counts[setting, row["tolerance"], "double"]
         assert (row["n"], row["mean"], row["sd"]) == (30, own.mean(), own.std(ddof=1))
         assert (row["difference"], row["equal"]) == (d.mean(), (d == 0).mean())
+        assert row["wrong"] == 3
         assert (row["low"], row["high"]) == tuple(map(float, mean_interval(d)))
         if row["arithmetic"] == "double":
             assert (row["difference"], row["equal"]) == (0.0, 1.0)

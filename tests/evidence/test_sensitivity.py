@@ -143,6 +143,9 @@ def test_shares_of_outcomes_by_hand() -> None:
             "low": [-2.0, -2.0, -5.0, -3.0, -1.0, 2.0, np.nan],
             "high": [-0.5, -0.5, -3.0, -1.0, 2.0, 4.0, np.nan],
             "outcome": [HOLDS, OPEN, HOLDS, HOLDS, OPEN, REVERSED, UNDEFINED],
+            "p_family": [0.5, 0.6, 0.01, 0.049, 0.05, 0.2, np.nan],
+            "p_median": [0.3] * 2 + [0.02] * 5,
+            "p_holds": [0.4] * 2 + [0.03] * 5,
         }
     )
     single, factorial = outcome_shares(table).to_dict("records")
@@ -154,6 +157,8 @@ def test_shares_of_outcomes_by_hand() -> None:
     assert (factorial["uncapped"], factorial["holds_uncapped"]) == (2, 1)
     assert (single["unchanged"], factorial["unchanged"]) == (1, 0)
     assert (factorial["median"], factorial["lowest"], factorial["highest"]) == (-0.5, -4.0, 3.0)
+    assert (single["p_median"], single["p_holds"], single["alone"]) == (0.3, 0.4, 0)
+    assert (factorial["p_median"], factorial["p_holds"], factorial["alone"]) == (0.02, 0.03, 2)
 
 
 # --- shares of variance ----------------------------------------------------------------------

@@ -243,7 +243,7 @@ def test_no_random_word_is_used_twice(small_demos: Demos, q_start: str) -> None:
     used: list[int] = []
     for seed in (1, 2):
         trial, agent, _ = recorded(small_demos, q_start=q_start, seed=seed)
-        assert trial.iterations == 6
+        assert trial.iterations >= 2
         for kind in ("learn", "roll"):
             calls = [call for name, call in agent.calls if name == kind]
             for before, after in pairwise(calls):
