@@ -87,6 +87,7 @@ def numbers(figures: Path) -> dict[str, Any]:
             "other": kinds.loc[~opposite, "holds"].tolist(),
         },
         "taken": by_key(read("open_maze/kinds"), "reading", "kind"),
+        "taken_soccer": by_key(read("soccer/kinds"), "reading", "kind"),
         "sets": by_key(read("open_maze/sets"), "set", "reading"),
         "ablations": by_key(read("sensitivity/ablations"), "method", "reading", "choices"),
         "every_pair": by_key(pairs[pairs["pairs"] == pairs["pairs"].max()], "reading"),
