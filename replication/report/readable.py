@@ -208,7 +208,9 @@ def sentence(part: pd.DataFrame) -> str:
         verdict = str(part["verdict"].iloc[0])
         if verdict == NOT_TESTABLE:
             return f"{verdict}: {part['why'].iloc[0]}"
-        return f"{verdict} in every cell" if len(part) > 1 else verdict
+        if part["set"].nunique() > 1:
+            return f"{verdict} under every reading and with both sets"
+        return f"{verdict} under every reading" if len(part) > 1 else verdict
     texts = [_of_set(rows) for _, rows in part.groupby("set", sort=False)]
     names = [SET_LABELS[set] for set in part["set"].unique()]
     if len(texts) == 1:

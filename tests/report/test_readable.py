@@ -190,7 +190,7 @@ JUDGED = table(
     ("G", "Growth", "mean", NONE, "updated", 0.1, 0.05, 0.2, 0.01, NAN, SHOWN, ""),
 ).assign(place="Fig. 6")
 SENTENCES = {
-    "A": "shown in every cell",
+    "A": "shown under every reading",
     "B": "shown under Fᵢ (printed), absent under Fᵢ₊₁ (updated)",
     "C": "named kinds: absent under every reading; general list: shown under Fᵢ (printed), "
     "inconclusive under Fᵢ₊₁ (updated), reversed under Fᵢ, maximum at once",
@@ -238,8 +238,10 @@ def test_a_run_that_is_not_testable_in_a_cell_has_no_probability_there() -> None
 
 
 def test_a_single_cell_is_its_verdict() -> None:
-    """A claim with one cell is not said to hold in every one."""
+    """A claim with one cell is not said to hold in every one; one with two sets in both."""
     assert sentence(JUDGED.head(1)) == "shown"
+    both = JUDGED[JUDGED["id"] == "C"].assign(verdict=ABSENT)
+    assert sentence(both) == "absent under every reading and with both sets"
 
 
 def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
