@@ -23,7 +23,7 @@ reproduce: $(VENV)/.ready ## run everything in the paper, judge each claim, buil
 	    $(VENV)/bin/replicate site && exit $$status
 
 sensitivity: $(VENV)/.ready ## what the verdicts depend on: the claims under hundreds of other choices
-	$(VENV)/bin/replicate run calibration sensitivity --here --check
+	$(VENV)/bin/replicate run rounding calibration sensitivity --here --check
 
 site: $(VENV)/.ready ## build the report from what is published in figures/, into build/site
 	$(VENV)/bin/replicate site
