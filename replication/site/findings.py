@@ -22,7 +22,7 @@ from replication.report.readable import (
     F_LABELS,
     SET_LABELS,
     markdown,
-    p_value,
+    p_is,
     readable_verdicts,
     sentence,
 )
@@ -68,9 +68,11 @@ def numbers(figures: Path) -> dict[str, Any]:
     levels, pairs = read("sensitivity/levels"), read("sensitivity/numbers")
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
     opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
+    sentences = {id: sentence(rows) for id, rows in by_claim(judged)}
     return {
         "judging": load_claims().judging,
-        "sentence": {id: sentence(rows) for id, rows in by_claim(judged)},
+        "sentence": sentences,
+        "on_tasks": {name: _on_tasks(name, sentences) for name in ("SAVES", "AVOIDS", "ERRS")},
         "verdicts": markdown(readable_verdicts(compared)),
         "holds": [
             (label(id), holding(effects, id)) for id in compared["id"].unique() if id in HOLDING
@@ -101,7 +103,7 @@ def numbers(figures: Path) -> dict[str, Any]:
         "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
         "general_size": _consistency(compared[in_general]),
         "set_labels": SET_LABELS,
-        "p": p_value,
+        "p": p_is,
         "depends": at_once(factorial),
         "chance": chance(factorial),
     }
@@ -109,6 +111,17 @@ def numbers(figures: Path) -> dict[str, Any]:
 
 HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
 """The claims of which the findings say in how many other sets of choices they hold."""
+
+
+def _on_tasks(name: str, sentences: Mapping[str, str]) -> str:
+    """Say what a claim about incorrect demonstrations comes to on each task; alike ones at once."""
+    open_maze, obstacles, soccer = (
+        sentences[f"{name}-{task}"] for task in ("OPEN", "OBSTACLES", "SOCCER")
+    )
+    mazes = f"Open maze: {open_maze}. Obstacles: {obstacles}"
+    if open_maze == obstacles:
+        mazes = f"In both mazes: {open_maze}"
+    return f"{mazes}. Soccer: {soccer}"
 
 
 def _consistency(rows: pd.DataFrame) -> str:
