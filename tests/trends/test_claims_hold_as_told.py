@@ -88,7 +88,7 @@ def test_turning_back_is_what_goes_wrong() -> None:
 
 
 def test_the_answer_on_the_baseline_depends_on_its_rule() -> None:
-    """Faster than R1, steadier under F_(i+1); `graded` never ends; others are mostly faster."""
+    """Faster than R1, steadier under F_(i+1); `graded` never ends; others are often faster."""
     assert (judged("FASTER")["verdict"] == SHOWN).all()
     assert judged("STEADIER")["verdict"].tolist() == [ABSENT, SHOWN]
     effects = read("sensitivity/effects")
@@ -96,7 +96,7 @@ def test_the_answer_on_the_baseline_depends_on_its_rule() -> None:
     rule = faster["specification"].map(lambda name: named_choices(name)["ADABOOST-RULE"])
     assert (faster[rule == "graded"]["capped"] == 10).all()
     for slower in ("vote", "log-odds"):
-        assert (faster[rule == slower]["outcome"] == "reversed").mean() > 0.5
+        assert (faster[rule == slower]["outcome"] == "reversed").mean() >= 0.5
     rules = ablations("adaboost", "")
     graded = rules.loc["ADABOOST-RULE=graded"]
     assert graded["capped"] == graded["n"]
