@@ -50,7 +50,7 @@ def joint_test(differences: Array) -> Joint:
 
     A column has the same seed in all rows, so that it is flipped as a whole. The null hypothesis is
     that the differences are symmetric about zero. The adjustment is the single step by the largest
-    |t| (Westfall and Young 1993), which holds whichever specifications have an effect. Signs are
+    size of t (Westfall and Young 1993), which holds whichever specifications have an effect. Signs are
     flipped in all 2^n ways, not in half as many: a count on one side changes when all are flipped.
     """
     _, n = differences.shape
