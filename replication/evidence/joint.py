@@ -50,8 +50,9 @@ def joint_test(differences: Array) -> Joint:
 
     A column has the same seed in all rows, so that it is flipped as a whole. The null hypothesis is
     that the differences are symmetric about zero. The adjustment is the single step by the largest
-    size of t (Westfall and Young 1993), which holds whichever specifications have an effect. Signs are
-    flipped in all 2^n ways, not in half as many: a count on one side changes when all are flipped.
+    size of t (Westfall and Young 1993), which holds whichever specifications have an effect. Signs
+    are flipped in all 2^n ways, not in half as many: a count on one side changes when all are
+    flipped.
     """
     _, n = differences.shape
     flips = np.concatenate(list(patterns(n, FLIPS)))
