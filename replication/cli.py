@@ -82,6 +82,20 @@ class OneLineErrors(click.Group):
             return super().invoke(ctx)
         except KeyboardInterrupt:
             _end("interrupted", 130)
+        except Exception as error:
+            if _is_interruption(error):
+                _end("interrupted", 130)
+            raise
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Return whether an error came up while an interruption was dealt with.
+
+    Libraries that are stopped half-way in starting threads or processes may raise another error.
+    """
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _end(message: str, code: int = 2) -> NoReturn:

@@ -316,6 +316,20 @@ def test_every_check_is_of_a_file() -> None:
         assert (files.PROJECT / name).exists()
 
 
+def test_an_error_of_an_interruption_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a library raises while it is interrupted is no fault of the program."""
+
+    def stopped(*_: object, **__: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise RuntimeError("cannot join thread before it is started")  # noqa: B904
+
+    monkeypatch.setattr("replication.pipeline.status.status_lines", stopped)
+    result = replicate("status")
+    assert (result.exit_code, result.output) == (130, "error: interrupted\n")
+
+
 # --- status, verify and clean ----------------------------------------------------------------
 
 
