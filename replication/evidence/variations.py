@@ -49,9 +49,7 @@ def maze_conditions(specification: Specification, cap: int) -> dict[Key, Conditi
         if id in choices:
             expert[_name(id)] = choices.pop(id)
     demos = _maze_demos(world, Expert(**expert))
-    return _chosen_reading(
-        demos, {"max_iterations": cap}, choices, EXPERIMENTS["open-maze"].methods
-    )
+    return _chosen_reading(demos, {"max_iterations": cap}, choices, "open-maze")
 
 
 def soccer_conditions(specification: Specification, cap: int) -> dict[Key, Condition]:
@@ -72,17 +70,18 @@ def soccer_conditions(specification: Specification, cap: int) -> dict[Key, Condi
         params = SoccerExpert(leave=str(leave)) if leave else SoccerExpert()
         demos = demonstrate_soccer(demos.task, field, params=params)
     base = {**experiment.choices, "max_iterations": cap}
-    return _chosen_reading(demos, base, choices, experiment.methods)
+    return _chosen_reading(demos, base, choices, "soccer")
 
 
 def _chosen_reading(
-    demos: Demos, base: Mapping[str, Any], choices: Mapping[str, Value], methods: tuple[str, ...]
+    demos: Demos, base: Mapping[str, Any], choices: Mapping[str, Value], experiment: str
 ) -> dict[Key, Condition]:
-    """Return the conditions of some methods under the reading of Eq. 9 and the set chosen."""
+    """Return the conditions of an experiment's methods under the reading and the set chosen."""
     values = {**base, **{_name(id): value for id, value in choices.items()}}
     reading = str(values.pop("f_index", default_of("F-INDEX")))
-    usual = "all" if "soccer" in demos.task else default_of("INCORRECT-KINDS")
-    conditions = conditions_of(demos, values, methods, [str(values.pop("incorrect", usual))])
+    design = EXPERIMENTS[experiment]
+    chosen = str(values.pop("incorrect", design.sets[0]))
+    conditions = conditions_of(demos, values, design.methods, [chosen])
     return {
         key: condition
         for key, condition in conditions.items()

@@ -54,6 +54,9 @@ def draw_single(numbers: pd.DataFrame) -> Figure:
         first = part.iloc[0]
         part = part.set_index("specification").loc[names].assign(y=y)
         drawing.scale(panel, "x", first["statistic"], part["effect"])
+        if panel.get_xscale() == "symlog":  # narrow: no room for a tick at each power of ten
+            far = 10.0 ** np.floor(np.log10(part["effect"].abs().max()))
+            panel.set_xticks([-far, 0, far])
         panel.axvline(first["neutral"], color="0.25", lw=1, zorder=1)
         panel.axvline(part.loc[DEFAULT, "effect"], color="0.1", lw=1, ls=(0, (4, 2)), zorder=1)
         for row in part[part["outcome"] != UNDEFINED].itertuples():
