@@ -29,7 +29,7 @@ from replication.evidence.verdicts import (
     by_claim,
 )
 from replication.irl import READINGS
-from replication.report import calibration, sensitivity, specification_curve, verdicts
+from replication.report import calibration, sensitivity, specification_curve, sweep, verdicts
 from replication.report.drawing import OUTCOMES, UNITS
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, sentence
@@ -148,7 +148,7 @@ PICTURES = {
     "soccer": sensitivity.single(EFFECTS, KICKED),
     "shares": sensitivity.shares(SHARES),
     "points": calibration.points(POINTS),
-    "numbers": sensitivity.numbers(NUMBERS),
+    "numbers": sweep.numbers(NUMBERS),
 }
 
 
