@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from replication.paper.register import load_choices
 ENTRY = load_choices()["ADABOOST-RULE"]
 RULES = [str(rule) for rule in (ENTRY.default, *ENTRY.alternatives)]
 NONE = np.zeros((1, 4), dtype=bool)
+Matrix = list[list[float]]
 
 
 def test_reconstruction_on_given_numbers() -> None:
@@ -22,6 +25,54 @@ def test_reconstruction_on_given_numbers() -> None:
     w, d_next = adaboost.update(np.zeros((1, 4)), d, mu_e, mu_i, NONE, Update())
     np.testing.assert_allclose(d_next, [[1 / 2, 1 / 6, 1 / 6, 1 / 6]])
     np.testing.assert_allclose(w, [[0.9, 0, 0, 0]])
+
+
+def by_formula(
+    rule: str, margin: float, w: Matrix, d: Matrix, mu_e: Matrix, mu_i: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Return the next weights and distribution, pair by pair as the notes of `update` have it."""
+    pairs = [(s, a) for s in range(len(w)) for a in range(len(w[0]))]
+    r = {(s, a): mu_e[s][a] - mu_i[s][a] for s, a in pairs}
+    most = max(abs(value) for value in r.values())
+    if rule == "log-odds":
+        for s, a in pairs:
+            x = min(abs(r[s, a]) / most, 1 - margin)
+            w[s][a] += math.copysign(math.log((1 + x) / (1 - x)) / 2, r[s, a])
+        return w, d
+    m = {pair: abs(r[pair]) / most if rule == "graded" else float(r[pair] != 0) for pair in pairs}
+    e = min(max(sum(d[s][a] * m[s, a] for s, a in pairs), 1e-6), 0.5 - margin)
+    c = math.log((1 - e) / e) / 2
+    for s, a in pairs:
+        d[s][a] *= math.exp(c * (2 * m[s, a] - 1))
+    z = sum(map(sum, d))
+    d = [[value / z for value in row] for row in d]
+    top = max(map(max, d))
+    for s, a in pairs:
+        sign = (r[s, a] > 0) - (r[s, a] < 0)
+        moves = {"vote": c * d[s][a] * sign, "confidence": c * r[s, a]}
+        w[s][a] += moves.get(rule, d[s][a] / top * r[s, a])
+    return w, d
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("margin", [0.01, 0.2])
+@pytest.mark.parametrize(
+    "d",
+    [[1, 1, 1, 1, 1, 1], [1, 2, 3, 1, 2, 3], [1e-8, 1e-8, 1, 1e-8, 1e-8, 1], [1, 1, 1e-8] * 2],
+    ids=["even", "uneven", "hardly any error", "hardly anything right"],
+)
+def test_each_rule_is_its_formula(rule: str, margin: float, d: list[float]) -> None:
+    """From any weights and distribution, each rule does what its formula says, pair by pair."""
+    mu_e = [[0.9, 0.5, 0.25], [0.0, 1.0, 0.7]]
+    mu_i = [[0.0, 0.7, 0.25], [0.3, 0.6, 0.7]]
+    w = [[0.5, -1.0, 2.0], [0.0, 0.25, -3.0]]
+    weighed = (np.array(d).reshape(2, 3) / sum(d)).tolist()
+    params = Update(adaboost_rule=rule, adaboost_margin=margin)
+    weights, before, expert, agent = (np.array(x) for x in (w, weighed, mu_e, mu_i))
+    found = adaboost.update(weights, before, expert, agent, np.zeros((2, 3), bool), params)
+    due = by_formula(rule, margin, w, weighed, mu_e, mu_i)
+    np.testing.assert_allclose(found[0], due[0], rtol=1e-12)
+    np.testing.assert_allclose(found[1], due[1], rtol=1e-12)
 
 
 def test_distribution_does_not_freeze_while_the_mismatches_stay() -> None:
