@@ -91,7 +91,7 @@ def unit(panel: Axes, name: str, statistic: str, measure: str) -> tuple[str, str
     return UNITS[statistic, measure], ", symmetric log axis" if symmetric else ""
 
 
-def pad(figure: Figure, **pads: float) -> None:
+def pad(figure: Figure, **pads: Any) -> None:
     """Set the paddings of a figure's layout."""
     engine: Any = figure.get_layout_engine()
     engine.set(**pads)

@@ -12,10 +12,11 @@ from replication.evidence.tables import contrasts_table, summary_table
 from replication.irl import READINGS, get_method
 from replication.irl.methods import TRACES
 from replication.paper.register import ChoiceError
-from replication.report import curves
+from replication.report import errors, iterations
 from replication.trials.measures import measure_trials
 from replication.trials.run import run_trials
 from replication.trials.store import Store
+from tests.report.legible import shown_texts
 
 
 def test_names_are_keys_and_labels_are_distinct() -> None:
@@ -86,9 +87,9 @@ def test_a_new_method_is_one_row(
     assert (compared.reading, compared.set) == ("", "none")
     assert (compared.y, compared.n) == ("adaboost", 3)
     for picture in (
-        curves.errors(trials, {}),
-        curves.iterations(trials, {}),
+        errors.falling(trials, {}),
+        iterations.per_trial(trials, {}),
     ):
         assert "Perceptron: " in picture.words
-        (legend,) = picture.draw(picture.numbers).legends
-        assert "Perceptron" in [entry.get_text() for entry in legend.get_texts()]
+        texts = shown_texts(picture.draw(picture.numbers))
+        assert "Perceptron" in [text.get_text() for text in texts]

@@ -17,9 +17,10 @@ from replication import Demos
 from replication.evidence.experiments import NONE, Key
 from replication.evidence.tables import kinds_table, read_table, sets_table, write_csv
 from replication.paper.published import FIGURE_5, TABLE_1
-from replication.report import curves, field, maze, why
+from replication.report import errors, field, iterations, maze, why
 from replication.report.learned import fit_figure
 from replication.report.picture import Picture
+from replication.report.sets import savings
 from replication.report.style import save_figure
 from replication.trials.condition import Condition
 from replication.trials.measures import Report, measure_trials
@@ -53,10 +54,10 @@ def pictures(
         "map": maze.demonstrations(small_demos),
         "map without incorrect": maze.demonstrations(small_demos.select("none")),
         "surfaces": maze.surfaces(traced, small_demos.environment, Report()),
-        "errors": curves.errors(trials, FIGURE_5),
-        "errors of one": curves.errors(one, {}, median=True),
-        "iterations": curves.iterations(trials, TABLE_1),
-        "sets": curves.sets(saved),
+        "errors": errors.falling(trials, FIGURE_5),
+        "errors of one": errors.falling(one, {}, median=True),
+        "iterations": iterations.per_trial(trials, TABLE_1),
+        "sets": savings(saved, TABLE_1),
         "why": why.why(kinds_table(trials), saved, {key: traced}, small_demos),
         "field": field.start(soccer_demos.environment),
         "soccer": field.demonstrations(soccer_demos),

@@ -40,7 +40,7 @@ def made(folder: Path, *outputs: Any, code: str = "x") -> Any:
 
 def test_a_figure_is_described_and_traced(folder: Path) -> None:
     """Its words are alternative text and caption; run, files, notebook and code stand below."""
-    words, code = "d falls [to 0]\nat once", "replication.report.curves.draw_errors"
+    words, code = "d falls [to 0]\nat once", "replication.report.errors.draw"
     figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt=words, code=code)
     node = made(folder, figure)
     assert node.cells[1].outputs == []
