@@ -22,7 +22,7 @@ from replication.files import read_file
 from replication.irl import Trial
 from replication.trials.compute import compute, trial_key
 from replication.trials.condition import Condition
-from replication.trials.measures import Report, factors, trial_row
+from replication.trials.measures import ALONG, Report, factors, trial_row
 from replication.trials.results import digest
 from replication.trials.run import workers
 from replication.trials.store import DamagedTrialError, Store
@@ -82,7 +82,8 @@ def recompute_trials(
     for name, condition, row in rows:
         k, root = _number(row)
         key = trial_key(condition, root, k, traced=False)
-        now = trial_row(condition, Report(), errors="errors" in row)(computed[key], k, root)
+        asked = {"errors": "errors" in row, "path": ALONG[0] in row}
+        now = trial_row(condition, Report(), **asked)(computed[key], k, root)
         (text,) = _as_text(pd.DataFrame([now])).to_dict("records")
         columns = {*row, *text} - {"part", "number"}
         if wrong := sorted(column for column in columns if row.get(column) != text.get(column)):

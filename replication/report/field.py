@@ -6,7 +6,7 @@ One file because it is one field, whose walls, paths and sizes are the same in b
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
+from numpy.typing import NDArray
 
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
@@ -32,12 +33,13 @@ from replication.report.style import (
     legend_below,
     settled,
 )
+from replication.report.ways import lanes
 
 COLOURS = KIND_COLOURS | {"overspeed": pitch.ORANGE, "opposite": OTHER_KIND_COLOUR}
 SPARE_COLOURS = (pitch.VERMILION, pitch.BLUE, "#000000", pitch.YELLOW)
 
-BESIDE = 0.02  # metres between ways that would hide each other
-BROAD, NARROW = 2.3, 1.1  # where kinds share a way, the later is drawn upon the broader earlier one
+BESIDE = 0.022  # metres between ways that share a stretch
+HEADS = 0.45  # metres of a way at least between two of its heads
 SLOW: dict[str, Any] = {"marker": "D", "ms": 4.5, "mfc": "white", "mew": 1.2}
 
 
@@ -93,14 +95,15 @@ def draw_start(numbers: pd.DataFrame) -> Figure:
     text = f"{len(rays)} infrared rays,\n{reach:g} m long"
     _label(panel, text, (x, y + reach + 0.012), va="bottom", color=pitch.VERMILION)
     _label(panel, "ball", (ball[0], ball[1] + 0.035), va="bottom")
-    _label(panel, "gate", (rules.WIDTH - 0.012, np.mean(rules.GATE)), ha="right", va="center")
+    beyond = rules.WIDTH + pitch.GATE_DEPTH
+    _label(panel, "gate", (beyond + 0.01, np.mean(rules.GATE)), ha="left", va="center", rotation=90)
     for number, (path, (x, y)) in enumerate(zip(rules.PATHS, obstacles, strict=True), 1):
         text = f"obstacle {number}\n{path.speed:.2f} m/s"
         if path.start[0] == path.end[0]:
             _label(panel, text, (x + 0.05, y), ha="left", va="center")
         else:
             _label(panel, text, (x, y - 0.05), va="top")
-    panel.set(xlabel="x (m)", ylabel="y (m)")
+    panel.set(xlabel="x (m)", ylabel="y (m)", xlim=(panel.get_xlim()[0], beyond + 0.05))
     return figure
 
 
@@ -175,41 +178,55 @@ def _ends_in_contact(demo: pd.DataFrame) -> bool:
 def draw_demonstrations(numbers: pd.DataFrame) -> Figure:
     """Draw correct demonstrations with what they detect, and incorrect ones from where they leave.
 
-    An incorrect demonstration is drawn from where it leaves the first correct one. If it stays on
-    that one's way it is drawn beside it, else one would hide the other.
+    An incorrect demonstration is drawn from where it leaves the first correct one. Where it shares
+    its way with others it is drawn beside them, else one would hide the other.
     """
-    correct, incorrect = _split(numbers)
-    figure, axes = canvas(1, 2, height=4.05, sharex=True, sharey=True)
+    figure, axes = canvas(1, 2, height=3.72, sharex=True, sharey=True)
+    pitch.draw_pitch(axes[0])
+    for demo in _split(numbers)[0]:
+        _draw_correct(axes[0], demo)
+    _place(axes[0], numbers)
+    first, *kinds = draw_ways(axes[1], numbers)
     for panel, title in zip(axes, ("(a) correct", "(b) incorrect"), strict=True):
-        pitch.draw_pitch(panel)
         panel.set(title=title, xlabel="x (m)")
     axes[0].set_ylabel("y (m)")
     axes[1].tick_params(left=False)
-    for demo in correct:
-        _draw_correct(axes[0], demo)
-        axes[1].plot(*_way(demo).T, color=pitch.PINK, lw=1.0, zorder=3)
     ring: dict[str, Any] = {"marker": "o", "ms": 10, "mfc": "none", "mec": CORRECT_COLOUR}
     cross: dict[str, Any] = {"marker": "x", "ms": 5, "mew": 1.5, "color": "0.3"}
-    handles = [
-        Line2D([], [], color=pitch.PINK, marker="o", ms=3.5, label=f"correct ({len(correct)})"),
+    marks = [
         Line2D([], [], color=pitch.PINK, label="drives slowly", **SLOW),
         Line2D([], [], lw=0, label="detected robot", **ring),
         Line2D([], [], lw=0, label="ends with a contact", **cross),
     ]
-    beside = (side * rank for rank in itertools.count(1) for side in (1, -1))
-    spare = itertools.cycle(SPARE_COLOURS)
-    for rank, (kind, demos) in enumerate(incorrect.items()):
-        colour = COLOURS.get(kind) or next(spare)
-        line: dict[str, Any] = {"color": colour, "lw": NARROW if rank else BROAD}
-        for demo in demos:
-            _draw_incorrect(axes[1], demo, _way(correct[0]), line, beside)
-        handles.append(Line2D([], [], label=f"{kind} ({len(demos)})", **line))
-    first = correct[0].iloc[0]
-    for panel in axes:
-        movers = pitch.Movers(panel, obstacles=False)
-        movers.place(first[["x", "y", "heading"]], first[["ball_x", "ball_y"]])
-    legend_below(figure, handles)
+    legend_below(figure, [first, *marks, *kinds])
     return figure
+
+
+def draw_ways(panel: Axes, numbers: pd.DataFrame) -> list[Line2D]:
+    """Draw the field with the ways of all demonstrations; return the entries of the legend."""
+    correct, incorrect = _split(numbers)
+    pitch.draw_pitch(panel)
+    right: dict[str, Any] = {"color": pitch.PINK, "marker": "o", "ms": 2.8}
+    for demo in correct:
+        panel.plot(*_way(demo).T, zorder=3, **right)
+    handles = [Line2D([], [], label=f"correct ({len(correct)})", **right)]
+    colours = _colours(incorrect)
+    demos = [(kind, demo) for kind, each in incorrect.items() for demo in each]
+    ways = [_branch(_way(demo), _way(correct[0])) for _, demo in demos]
+    for (kind, demo), way in zip(demos, _apart(ways, _way(correct[0])), strict=True):
+        _draw_incorrect(panel, demo, way, colours[kind])
+    for kind, each in incorrect.items():
+        style: dict[str, Any] = {"color": colours[kind], "marker": ">", "ms": 4}
+        handles.append(Line2D([], [], label=f"{kind} ({len(each)})", **style))
+    _place(panel, numbers)
+    return handles
+
+
+def _place(panel: Axes, numbers: pd.DataFrame) -> None:
+    """Put the robot and the ball where they start."""
+    start = numbers.iloc[0]
+    movers = pitch.Movers(panel, obstacles=False)
+    movers.place(start[["x", "y", "heading"]], start[["ball_x", "ball_y"]])
 
 
 def _way(demo: pd.DataFrame) -> pitch.Floats:
@@ -232,28 +249,52 @@ def _draw_correct(panel: Axes, demo: pd.DataFrame) -> None:
             panel.add_patch(Circle(centre, radius, fill=False, ec=CORRECT_COLOUR, lw=1.4, zorder=7))
 
 
-def _draw_incorrect(
-    panel: Axes,
-    demo: pd.DataFrame,
-    right: pitch.Floats,
-    line: Mapping[str, Any],
-    beside: Iterator[int],
-) -> None:
-    way = _way(demo)
+def _colours(kinds: Iterable[str]) -> dict[str, str]:
+    """Return a colour for each kind of mistake, the user's own kinds included."""
+    own = (kind for kind in kinds if kind not in COLOURS)
+    return COLOURS | dict(zip(own, itertools.cycle(SPARE_COLOURS), strict=False))
+
+
+def _branch(way: pitch.Floats, right: pitch.Floats) -> pitch.Floats:
+    """Return a way from where it leaves the right one."""
     shared = min(len(way), len(right))
     same = (way[:shared] == right[:shared]).all(axis=1)
-    branch = way[(shared if same.all() else int(same.argmin())) - 1 :]
-    on_way = np.array([_distance(place, right) < BESIDE / 2 for place in branch])
-    if on_way[1:].mean() > 0.5:
-        x, y = right[-1] - right[0]
-        across = np.array([-y, x]) / np.hypot(x, y)
-        branch = branch + on_way[:, None] * next(beside) * BESIDE * across
-    panel.plot(*branch.T, marker="o", ms=line["lw"] + 0.6, zorder=5.5, **line)
-    if _ends_in_contact(demo):
-        panel.plot(*branch[-1], "x", color=line["color"], ms=5.5, mew=1.6, zorder=6)
-    elif demo["outcome"].iloc[-1] != "goal":
-        style = {"arrowstyle": "-|>", "color": line["color"], "shrinkA": 0, "shrinkB": 0}
-        panel.annotate("", branch[-1], branch[-2], arrowprops=style, zorder=6)
+    return way[(shared if same.all() else int(same.argmin())) - 1 :]
+
+
+def _apart(ways: Sequence[pitch.Floats], right: pitch.Floats) -> list[pitch.Floats]:
+    """Return ways moved aside where they share a stretch with each other or the right one."""
+    every = [right, *ways]
+    chosen = lanes(every, lambda one, other: bool(_shared(one, other).any()))
+    moved = []
+    for n, (way, lane) in enumerate(zip(ways, chosen[1:], strict=True), 1):
+        shared = np.any([_shared(way, other) for other in every[:n]], axis=0)
+        ahead = np.gradient(way, axis=0) * (-1 if way[-1][0] < way[0][0] else 1)
+        across = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+        moved.append(way + shared[:, None] * lane * BESIDE * across)
+    return moved
+
+
+def _shared(way: pitch.Floats, other: pitch.Floats) -> NDArray[np.bool_]:
+    """Return which places of a way lie on another: three in a row, else it is a crossing."""
+    on = np.array([_distance(place, other) < BESIDE / 2 for place in way])
+    runs = [list(run) for _, run in itertools.groupby(on)]
+    return np.concatenate([np.full(len(run), run[0] and len(run) > 2) for run in runs])
+
+
+def _draw_incorrect(panel: Axes, demo: pd.DataFrame, way: pitch.Floats, colour: str) -> None:
+    """Draw a way with a head in every other stretch, and with how it ends."""
+    panel.plot(*way.T, marker="o", ms=2, lw=1.3, color=colour, zorder=5.5)
+    contact = _ends_in_contact(demo)
+    if contact:
+        panel.plot(*way[-1], "x", color=colour, ms=5.5, mew=1.6, zorder=6)
+    run = np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))
+    heads = [int(np.searchsorted(run, at)) for at in np.arange(HEADS / 2, run[-1], HEADS)]
+    for head in heads or [len(run) - 1]:
+        tip = (way[head] + 2 * way[head + 1]) / 3
+        arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0}
+        panel.annotate("", tip, way[head], arrowprops=arrow | {"mutation_scale": 8}, zorder=6)
 
 
 def _distance(place: pitch.Floats, way: pitch.Floats) -> float:

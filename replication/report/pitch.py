@@ -30,7 +30,7 @@ STRIPE = ((-0.5, -0.16), (0.5, -0.16), (0.5, 0.16), (-0.5, 0.16))
 
 def draw_pitch(panel: Axes, *, small: bool = True) -> None:
     """Draw walls, gate and the obstacles' paths, and set up the axes."""
-    width, head, gap, layer = (0.6, 6, 0.4, 1.0) if small else (1.0, 10, 0.2, 4.5)
+    width, head, parts = (0.6, 6, 2) if small else (1.0, 10, 7)
     thick = 2 * rules.WALL_RADIUS
     low, high = rules.GATE
     gate = [(rules.WIDTH, low), (rules.WIDTH + GATE_DEPTH, low)]
@@ -41,15 +41,15 @@ def draw_pitch(panel: Axes, *, small: bool = True) -> None:
     for path in rules.PATHS:
         arrow = {"arrowstyle": "<|-|>", "ls": "--", "color": "#6C8EBF", "lw": width}
         arrow |= {"shrinkA": 0, "shrinkB": 0, "mutation_scale": head}
-        panel.annotate("", path.end, path.start, arrowprops=arrow, zorder=layer)
+        panel.annotate("", path.end, path.start, arrowprops=arrow, zorder=1)
     margin = thick + 0.01
     panel.set(
         xlim=(-margin, rules.WIDTH + GATE_DEPTH + 0.01),
         ylim=(-margin, rules.HEIGHT + margin),
         aspect="equal",
         anchor="N",  # else the layout, which knows nothing of the aspect, may cut a title
-        xticks=np.arange(0, rules.WIDTH + 0.01, gap),
-        yticks=np.arange(0, rules.HEIGHT + 0.01, gap),
+        xticks=np.linspace(0, rules.WIDTH, parts + 1),
+        yticks=np.linspace(0, rules.HEIGHT, max(2, parts - 1) + 1),
     )
     panel.spines[:].set_visible(False)
     panel.tick_params(length=2)

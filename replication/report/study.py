@@ -44,6 +44,8 @@ class Study(Outputs):
     sets, set_trials
         Sets of incorrect demonstrations that are run beside those by which the paper is judged, and
         the number of their trials.
+    path
+        Whether the table of trials has Q along the expert's path.
     report
         Fields of :class:`replication.trials.measures.Report`.
     """
@@ -61,6 +63,7 @@ class Study(Outputs):
         trials: int,
         sets: Sequence[str] = (),
         set_trials: int = 0,
+        path: bool = False,
         **report: Any,
     ) -> None:
         super().__init__(resolve(out))
@@ -68,7 +71,7 @@ class Study(Outputs):
         self.demos = load_demos(resolve(demos))
         self.choices = {**design.choices, **choices}
         self.report = Report(**report)
-        self.number, self.set_number = trials, set_trials
+        self.number, self.set_number, self.path = trials, set_trials, path
         self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
         given = self.demos, self.choices, design.methods
         self.conditions = experiments.conditions_of(*given, design.sets)
@@ -87,7 +90,8 @@ class Study(Outputs):
         ]
         settings = {**self.settings}
         stage = settings.pop("seed"), lambda _: groups
-        return self.computed(stage, report=self.report, errors=True, **settings)
+        columns: dict[str, Any] = {"report": self.report, "errors": True, "path": self.path}
+        return self.computed(stage, **columns, **settings)
 
     @cached_property
     def main(self) -> pd.DataFrame:

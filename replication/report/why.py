@@ -1,4 +1,4 @@
-"""Why turning back counts: a loop on the map, what wrong trajectories take, and what it saves."""
+"""Why turning back counts: a walk on the map, what wrong trajectories take, and what it saves."""
 
 from __future__ import annotations
 
@@ -7,19 +7,24 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from replication.demos.model import Demos
-from replication.envs.maze import as_maze
+from replication.envs.maze import Maze, as_maze
 from replication.evidence.experiments import GENERAL, NAMED, NONE, Key
 from replication.irl import Trial
+from replication.irl.agent import Episode
+from replication.irl.expectations import visited
 from replication.report.drawing import READING_MARKS, handle
-from replication.report.maze import draw_map, map_numbers, places
+from replication.report.maze import draw_map, map_numbers, places, ticks
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, SET_LABELS
 from replication.report.style import canvas, legend_below, settled
+from replication.report.ways import COLOURS
+from replication.trials.measures import kind_pairs
 
 SHOWN = "unified", "printed", NONE
 """The trial whose trajectory is drawn."""
@@ -42,46 +47,75 @@ def why(
     """
     maze = as_maze(demos.environment)
     episode = trials[SHOWN].episodes[1]
-    x, y = places(maze, episode.states)
     path_x, path_y = places(maze, demos.correct[0].states)
+    moves = _moves(maze, episode, demos)
     parts = [
         map_numbers(maze).assign(part="map"),
         pd.DataFrame({"part": "path", "x": path_x, "y": path_y}),
-        pd.DataFrame({"part": "trajectory", "x": x, "y": y}),
+        moves.assign(part="move"),
         kinds.assign(part="kind"),
         saved[saved["set"].isin(ALONE)].assign(part="saved"),
     ]
     taken = "; ".join(
         f"{row.kind}, {F_LABELS[row.reading]}: {row.weight:.0%}" for row in kinds.itertuples()
     )
+    counts = moves.groupby("kind", sort=False)["count"].sum()
+    listed = "; ".join(f"{counts[kind]} {text}" for kind, text in MARKED.items() if kind in counts)
     words = (
         f"After its first update the agent walks {len(np.unique(episode.states))} cells of the map "
-        f"in {len(episode.actions)} moves. Share of each kind in the discounted visits of wrong "
-        f"pairs: {taken}."
+        f"in {len(episode.actions)} moves: {listed}. Share of each kind in the "
+        f"discounted visits of wrong pairs: {taken}."
     )
     return Picture(pd.concat(parts, ignore_index=True), draw_why, words)
+
+
+def _moves(maze: Maze, episode: Episode, demos: Demos) -> pd.DataFrame:
+    """Return each move of an episode once: how often it is made, and which kind marks it."""
+    pairs = np.stack([episode.states[:-1], episode.actions], axis=1)
+    (states, actions), counts = (part.T for part in np.unique(pairs, axis=0, return_counts=True))
+    shape = maze.n_states, maze.n_actions
+    known = {"correct": visited(demos.correct, shape=shape), **kind_pairs(demos)}
+    kinds = [
+        next((kind for kind, marked in known.items() if marked[pair]), "unmarked")
+        for pair in zip(states, actions, strict=True)
+    ]
+    (x, y), (to_x, to_y) = places(maze, states), places(maze, maze.next_state[states, actions])
+    return pd.DataFrame(
+        {"kind": kinds, "x": x, "y": y, "to_x": to_x, "to_y": to_y, "count": counts}
+    )
 
 
 ALONE = ("hit", "detour", "opposite", NAMED, GENERAL)
 """The sets whose savings are drawn."""
 
+AROUND = 7
+"""Cells of the map at least, along each side."""
 
-PATH: dict[str, Any] = {"color": "0.55", "lw": 4, "alpha": 0.5, "solid_capstyle": "round"}
-WAY: dict[str, Any] = {"color": "#D55E00", "lw": 1.6}
+
+MARKED = {
+    "correct": "as the expert",
+    "hit": "wrong, as in hits",
+    "detour": "wrong, as in detours",
+    "opposite": "turning back (general list only)",
+    "unmarked": "wrong otherwise",
+}
+"""What a move of the agent is, in words."""
+
+PATH: dict[str, Any] = {"color": "0.55", "lw": 7, "alpha": 0.5, "solid_capstyle": "round"}
+MOVE_COLOURS = COLOURS | {"correct": "0.3", "opposite": "#D55E00", "unmarked": "#CC79A7"}
+SIDE = 0.17  # cells between a move and the middle of its cells, so that to and fro are two arrows
 
 
 @settled
 def draw_why(numbers: pd.DataFrame) -> Figure:
     """Draw the three panels."""
-    figure, (where, taken, saves) = canvas(1, 3, height=3.0, width_ratios=(1.1, 1, 1))
-    cells = numbers[numbers["part"] == "map"].astype({"x": int, "y": int})
-    draw_map(where, cells, grid=False)
-    path = numbers[numbers["part"] == "path"]
-    where.plot(path["x"], path["y"], **PATH)
-    way = numbers[numbers["part"] == "trajectory"]
-    where.plot(way["x"], way["y"], **WAY)
-    where.plot(way["x"].iloc[-1], way["y"].iloc[-1], "o", color=WAY["color"], ms=4)
-    where.set(xticks=[], yticks=[], xlabel="", ylabel="")
+    figure, (where, taken, saves) = canvas(1, 3, height=3.4, width_ratios=(1.1, 1, 1))
+    moves = numbers[numbers["part"] == "move"]
+    _draw_moves(where, numbers, moves)
+    where.set_anchor("N")
+    where.set_title("(a) a walk after one update")
+    taken.set_title("(b) what goes wrong")
+    saves.set_title("(c) what is saved")
 
     kinds = numbers[numbers["part"] == "kind"]
     names = list(dict.fromkeys(kinds["kind"]))
@@ -107,16 +141,62 @@ def draw_why(numbers: pd.DataFrame) -> Figure:
         saves.plot(rows["saved"], y, mark, color=colour, ms=4)
     saves.axvline(0, color="0.5", lw=0.8)
     saves.set_yticks(range(len(sets)), [SET_LABELS.get(name, name) for name in sets])
-    saves.set_xlabel("iterations saved\nby such demonstrations")
+    saves.set_xlabel("iterations saved,\nwith 95 % interval")
     for panel in (taken, saves):
         panel.invert_yaxis()
+    counts = moves.groupby("kind")["count"].sum()
     handles = [
         Line2D([], [], label="the expert's path", **PATH),
-        Line2D([], [], label="the agent's after the first update", **WAY),
+        *(
+            Line2D(
+                [],
+                [],
+                color=MOVE_COLOURS[kind],
+                marker=">",
+                ms=5,
+                label=f"{text}: {counts[kind]:.0f} moves",
+            )
+            for kind, text in MARKED.items()
+            if kind in counts
+        ),
         *(handle(F_LABELS[name], *READING_MARKS[name], lw=1.3) for name in readings),
     ]
     legend_below(figure, handles)
     return figure
+
+
+def _draw_moves(panel: Axes, numbers: pd.DataFrame, moves: pd.DataFrame) -> None:
+    """Draw each move of a walk as an arrow, on that part of the map where it is."""
+    cells = numbers[numbers["part"] == "map"].astype({"x": int, "y": int})
+    path = numbers[numbers["part"] == "path"]
+    walked = np.concatenate([moves[["x", "y"]], moves[["to_x", "to_y"]]])
+    seen = {(x, y) for x, y in np.concatenate([walked, path[["x", "y"]]])}
+    draw_map(panel, cells, avoid=seen)
+    panel.plot(path["x"], path["y"], zorder=1, **PATH)
+    for move in moves.itertuples():
+        start, end = np.array([move.x, move.y]), np.array([move.to_x, move.to_y])
+        colour, (ahead, up) = MOVE_COLOURS[move.kind], end - start
+        if (start == end).all():
+            panel.plot(*start, "x", color=colour, ms=6, mew=1.5, zorder=4)
+            continue
+        aside = SIDE * np.array([up, -ahead])
+        arrow = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
+        tip, tail = (tuple(place + aside) for place in (end, start))
+        panel.annotate("", tip, tail, arrowprops=arrow, zorder=4)
+    _zoom(panel, walked)
+
+
+def _zoom(panel: Axes, walked: NDArray[np.float64]) -> None:
+    """Show a square of the map, with at least :data:`AROUND` cells, about what is walked."""
+    low, high = walked.min(axis=0), walked.max(axis=0)
+    side = max(AROUND, (high - low).max() + 3)
+    for middle, name in zip((low + high) / 2, "xy", strict=True):
+        _, end = getattr(panel, f"get_{name}lim")()
+        n = end + 0.5
+        first = np.clip(np.round(middle - (side - 1) / 2), 0, max(n - side, 0))
+        last = min(first + side, n)
+        getattr(panel, f"set_{name}lim")(first - 0.5, last - 0.5)
+        getattr(panel, f"set_{name}ticks")([first + tick for tick in ticks(int(last - first))])
 
 
 def _places(readings: list[str]) -> NDArray[np.float64]:

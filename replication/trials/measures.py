@@ -50,27 +50,34 @@ def measure_trials(
     report: Report | None = None,
     *,
     errors: bool = False,
+    path: bool = False,
 ) -> pd.DataFrame:
     """Return the table of some conditions' trials, with a :func:`trial_row` for each."""
     rows = []
     for condition in conditions:
-        row = trial_row(condition, report or Report(), errors=errors)
+        row = trial_row(condition, report or Report(), errors=errors, path=path)
         rows += [row(results.trial(condition, k), k, results.seed) for k in range(results.trials)]
     return pd.DataFrame(rows)
 
 
 def trial_row(
-    condition: Condition, report: Report, *, errors: bool
+    condition: Condition, report: Report, *, errors: bool, path: bool = False
 ) -> Callable[[Trial, int, int], dict[str, Any]]:
     """Return a function of a trial, its number and its root seed: its row in ``trials.csv``.
 
     The columns are those of :func:`planned_trials` and :func:`measure`, `steps` (of the
     environment), `digest` and, if asked for, `errors`: d before each iteration and after the last
-    one, separated by blanks.
+    one, separated by blanks; and those of :func:`along_path`, which are empty but for the unified
+    method, whose growth is judged.
     """
     kinds = kind_pairs(condition.demos)
     shown = marked_pairs(condition.selected)
     gamma = condition.params.learner.gamma
+
+    def along(trial: Trial) -> dict[str, str]:
+        if condition.method != "unified":
+            return dict.fromkeys(ALONG, "")
+        return along_path(trial, condition.demos, report)
 
     def row(trial: Trial, k: int, seed: int) -> dict[str, Any]:
         return (
@@ -79,6 +86,7 @@ def trial_row(
             | measure(trial, condition.demos, kinds, shown, report, gamma=gamma)
             | {"steps": trial.steps, "digest": digest(trial)}
             | ({"errors": " ".join(f"{d:.10g}" for d in trial.errors)} if errors else {})
+            | (along(trial) if path else {})
         )
 
     return row
@@ -89,9 +97,34 @@ def error_histories(trials: pd.DataFrame) -> NDArray[np.float64]:
 
     After its end a trial keeps its last d.
     """
-    curves = [np.array(text.split(), dtype=float) for text in trials["errors"]]
+    curves = numbers_in(trials["errors"])
     longest = max(map(len, curves))
     return np.array([np.pad(d, (0, longest - len(d)), mode="edge") for d in curves])
+
+
+def numbers_in(texts: Iterable[str]) -> list[NDArray[np.float64]]:
+    """Return the numbers of texts that have them separated by blanks."""
+    return [np.array(text.split(), dtype=float) for text in texts]
+
+
+ALONG = ("path_q", "path_q_growth")
+"""The columns of :func:`along_path`."""
+
+
+def along_path(trial: Trial, demos: Demos, report: Report) -> dict[str, str]:
+    """Return Q in the mid-term, and its growth from then to the end, at each step of the expert.
+
+    The path is that of the first correct demonstration, without the goal, where nobody acts. Three
+    digits of each number, separated by blanks: a figure shows no more.
+    """
+    states = np.unique(np.concatenate([demo.states[:-1] for demo in demos.correct]))
+    steps = np.searchsorted(states, demos.correct[0].states[:-1])
+    middle = trial.values[_middle(trial, report), steps].astype(float)
+    growth = trial.values[-1, steps] - middle
+    return {
+        name: " ".join(f"{value:.3g}" for value in values)
+        for name, values in zip(ALONG, (middle, growth), strict=True)
+    }
 
 
 def factors(condition: Condition) -> dict[str, str]:
@@ -139,7 +172,7 @@ def measure(
         The discount of visits.
     """
     early = early_iterations(demos, report)
-    middle = round(report.mid_term * trial.iterations)
+    middle = _middle(trial, report)
     wrong = marked_pairs(demos)
     right = visited(demos.correct, shape=wrong.shape)
     first, *later = (
@@ -187,6 +220,11 @@ def marked_pairs(demos: Demos) -> NDArray[np.bool_]:
 def _errors(episode: Episode, wrong: NDArray[np.bool_]) -> int:
     """Return how many motions of an episode run into something, or take one of some pairs."""
     return int((episode.hits | wrong[episode.states[:-1], episode.actions]).sum())
+
+
+def _middle(trial: Trial, report: Report) -> int:
+    """Return after how many iterations mid-term is (choice FIG7-MIDTERM)."""
+    return round(report.mid_term * trial.iterations)
 
 
 def _growth(values: NDArray[np.float32], middle: int) -> float:

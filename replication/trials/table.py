@@ -28,11 +28,16 @@ def planned_table(groups: Sequence[Group], seed: int) -> pd.DataFrame:
 
 
 def computed_table(
-    groups: Sequence[Group], report: Report | None = None, *, errors: bool = False, **settings: Any
+    groups: Sequence[Group],
+    report: Report | None = None,
+    *,
+    errors: bool = False,
+    path: bool = False,
+    **settings: Any,
 ) -> pd.DataFrame:
     """Compute the trials of all groups, and return them measured, in the same order.
 
-    `report` and `errors` are those of :func:`replication.trials.measures.measure_trials`,
+    `report`, `errors` and `path` are those of :func:`replication.trials.measures.measure_trials`,
     `settings` those of :func:`replication.trials.run.run_trials`.
     """
     results = {
@@ -46,7 +51,7 @@ def computed_table(
     return _table(
         groups,
         lambda group: measure_trials(
-            results[group.trials], group.conditions, report, errors=errors
+            results[group.trials], group.conditions, report, errors=errors, path=path
         ),
     )
 

@@ -39,7 +39,7 @@ def table(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(EXPERIMENTS, "small", experiment)
     groups = [Group(list(experiment.conditions().values()), 2)]
     store = Store(tmp_path / "s.sqlite")
-    trials = computed_table(groups, errors=True, store=store, seed=4)
+    trials = computed_table(groups, errors=True, path=True, store=store, seed=4)
     return write_csv(trials, tmp_path / "trials.csv")
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -45,6 +47,22 @@ def test_ways_are_drawn_as_replayed(drawing: Figure, soccer_demos: Demos) -> Non
     for panel in drawing.axes:
         assert panel.get_aspect() == 1
         assert any(np.array_equal(np.asarray(line.get_xydata()), way) for line in panel.lines)
+
+
+def test_no_way_hides_another(drawing: Figure) -> None:
+    """No two demonstrations are drawn on the same stretch, as their places would be the same."""
+    ways = [np.asarray(line.get_xydata()).round(4) for line in drawing.axes[1].lines]
+    stretches = [{*map(tuple, np.hstack([way[:-1], way[1:]]))} for way in ways if len(way) > 2]
+    assert len(stretches) > 10
+    for one, other in itertools.combinations(stretches, 2):
+        assert not one & other
+
+
+def test_ticks_end_with_the_field(drawing: Figure) -> None:
+    """The axes have ticks at both ends of the field."""
+    for panel in drawing.axes:
+        assert panel.get_xticks()[[0, -1]].tolist() == [0, rules.WIDTH]
+        assert panel.get_yticks()[[0, -1]].tolist() == [0, rules.HEIGHT]
 
 
 def test_contacts_are_crossed(drawing: Figure, soccer_demos: Demos) -> None:

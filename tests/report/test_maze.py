@@ -1,49 +1,20 @@
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+
 import pytest
+from matplotlib.figure import Figure
 
-from replication import Demos
+from replication import Demos, Maze, demonstrate
 from replication.envs.maze import MazeError, as_maze
-from replication.envs.soccer.field import SoccerField
-from replication.evidence.experiments import NONE, Key
-from replication.irl import Trial
-from replication.report.maze import demonstrations, draw_surfaces, map_numbers, surfaces
-from replication.trials.condition import Condition
-from replication.trials.measures import Report
-from replication.trials.results import Results
-
-
-@pytest.fixture
-def trial(conditions: dict[Key, Condition], results: Results) -> Trial:
-    """Return a trial of the unified method that kept every iteration."""
-    return results.trial(conditions["unified", "printed", NONE], 0, snapshots=True)
-
-
-def test_surfaces_are_those_of_the_traced_trial(small_demos: Demos, trial: Trial) -> None:
-    """Fig. 7: the best or mean action of Q half-way, Q at the end, and the reward at the end."""
-    assert trial.snapshots is not None
-    free = as_maze(small_demos.environment).free
-    middle, end = round(trial.iterations / 2), trial.iterations
-    tables = {"q_mid": trial.snapshots.q[middle], "q_end": trial.q, "reward_end": trial.weights}
-    for report, reduce in ((Report(), np.max), (Report(surface="mean"), np.mean)):
-        numbers = surfaces(trial, small_demos.environment, report).numbers
-        assert numbers["surface"].unique().tolist() == list(tables)
-        for name, table in tables.items():
-            values = numbers[numbers["surface"] == name]["value"].to_numpy()
-            np.testing.assert_array_equal(values[free], reduce(table, axis=1)[free])
-            assert np.isnan(values[~free]).all()
-        first = numbers.groupby("surface", sort=False)["iteration"].first()
-        assert first.tolist() == [middle, end, end]
-
-
-def test_surfaces_are_named_in_words_and_titles(small_demos: Demos, trial: Trial) -> None:
-    """Titles say after how many iterations, the words also between which values."""
-    picture = surfaces(trial, small_demos.environment, Report())
-    titles = [panel.get_title() for panel in draw_surfaces(picture.numbers).axes]
-    assert titles[1] == f"(b) Q at the end ({trial.iterations})"
-    values = picture.numbers.groupby("surface")["value"].agg(["min", "max"]).loc["q_end"]
-    assert f"{titles[1]}: {values['min']:.3g} to {values['max']:.3g}" in picture.words
+from replication.report.maze import (
+    demonstrations,
+    draw_demonstrations,
+    draw_map,
+    map_numbers,
+    ticks,
+)
+from tests.report.legible import assert_legible
 
 
 def test_map_by_hand(small_demos: Demos) -> None:
@@ -72,7 +43,71 @@ def test_words_count_the_demonstrations(small_demos: Demos) -> None:
     assert f"{len(hits.incorrect)} hit" in words
 
 
-def test_soccer_is_refused(trial: Trial) -> None:
+def test_words_tell_correct_demonstrations_apart() -> None:
+    """Several correct demonstrations are counted, with the moves of each."""
+    demos = demonstrate("two", Maze.from_text("...G\nS..."))
+    again = replace(demos.correct[0], name="again")
+    two = Demos(demos.task, demos.environment, (demos.correct[0], again), ())
+    assert "2 correct demonstrations of 4 moves" in demonstrations(two).words
+
+
+def test_both_panels_show_the_same_map(stored_demos: Demos) -> None:
+    """Ticks end with the grid, the legend counts each kind, and all texts are legible."""
+    picture = demonstrations(stored_demos)
+    figure = draw_demonstrations(picture.numbers)
+    for panel in figure.axes:
+        assert panel.get_xticks().tolist() == panel.get_yticks().tolist() == [0, 5, 10, 15, 19]
+    (legend,) = figure.legends
+    kinds = [demo.kind for demo in (*stored_demos.correct, *stored_demos.incorrect)]
+    expected = [f"{kind} ({kinds.count(kind)})" for kind in dict.fromkeys(kinds)]
+    assert [text.get_text() for text in legend.get_texts()] == expected
+    figure.draw_without_rendering()  # which applies the aspect
+    assert_legible(figure)
+
+
+def test_letters_stand_beside_cells_where_no_way_is(stored_demos: Demos) -> None:
+    """S and G are beside the start's and the goal's cell, in none that a demonstration visits."""
+    picture = demonstrations(stored_demos)
+    shown = picture.numbers[picture.numbers["part"] != "map"]
+    visited = set(zip(shown["x"], shown["y"], strict=True))
+    own = map_numbers(as_maze(stored_demos.environment)).set_index("kind")[["x", "y"]]
+    for panel in draw_demonstrations(picture.numbers).axes:
+        for text, kind in zip(panel.texts, ("start", "goal"), strict=True):
+            x, y = (round(value) for value in text.get_position())
+            assert max(abs(x - own.loc[kind, "x"]), abs(y - own.loc[kind, "y"])) == 1
+            assert text.get_text() == kind[0].upper()
+            assert (x, y) not in visited
+
+
+def test_letters_find_a_place_where_ways_are_everywhere() -> None:
+    """With no cell free of ways, a letter stands beside its cell all the same."""
+    numbers = map_numbers(as_maze(Maze.from_text("S#\nG.")))
+    panel = Figure().subplots()
+    draw_map(panel, numbers, avoid={(x, y) for x in range(2) for y in range(2)})
+    assert [text.get_text() for text in panel.texts] == ["S", "G"]
+
+
+@pytest.mark.parametrize(
+    ("count", "expected"),
+    [(1, [0]), (7, [0, 1, 2, 3, 4, 5, 6]), (17, [0, 5, 10, 16]), (20, [0, 5, 10, 15, 19])],
+)
+def test_ticks_end_with_the_grid(count: int, expected: list[int]) -> None:
+    """The last tick is at the last cell, and none is too near to it."""
+    assert ticks(count) == expected
+
+
+def test_a_wide_map_leaves_no_empty_space() -> None:
+    """The figure is as high as its maps need."""
+    wide = demonstrate("wide", Maze.from_text("S" + "." * 30 + "G\n" + "." * 32 + "\n" + "." * 32))
+    square = demonstrate("square", Maze.from_text("S..\n...\n..G"))
+    heights = [
+        picture.draw(picture.numbers).get_size_inches()[1]
+        for picture in map(demonstrations, (wide, square))
+    ]
+    assert heights[0] < heights[1] / 1.5
+
+
+def test_soccer_is_refused(soccer_demos: Demos) -> None:
     """What is no maze is refused in a line."""
     with pytest.raises(MazeError, match="a maze is needed"):
-        surfaces(trial, SoccerField(), Report())
+        demonstrations(soccer_demos)

@@ -17,7 +17,7 @@ from replication import Demos
 from replication.evidence.experiments import NONE, Key
 from replication.evidence.tables import kinds_table, read_table, sets_table, write_csv
 from replication.paper.published import FIGURE_5, TABLE_1
-from replication.report import errors, field, iterations, maze, why
+from replication.report import errors, field, iterations, maze, values, why
 from replication.report.learned import fit_figure
 from replication.report.picture import Picture
 from replication.report.sets import savings
@@ -27,7 +27,7 @@ from replication.trials.measures import Report, measure_trials
 from replication.trials.results import Results
 
 KINDS = [
-    *("map", "map without incorrect", "surfaces", "errors", "errors of one", "iterations"),
+    *("map", "map without incorrect", "values", "errors", "errors of one", "iterations"),
     *("sets", "why", "field", "soccer", "soccer without incorrect"),
 ]
 
@@ -49,11 +49,13 @@ def pictures(
     saved = sets_table(measure_trials(results, every.values()), every)
     key = "unified", "printed", NONE
     traced = results.trial(conditions[key], 0, snapshots=True)
+    unified = [conditions["unified", reading, NONE] for reading in ("printed", "updated")]
+    along = measure_trials(results, unified, path=True)
     one = trials[trials["method"] == "adaboost"]
     return {
         "map": maze.demonstrations(small_demos),
         "map without incorrect": maze.demonstrations(small_demos.select("none")),
-        "surfaces": maze.surfaces(traced, small_demos.environment, Report()),
+        "values": values.values(traced, small_demos, Report(), along),
         "errors": errors.falling(trials, FIGURE_5),
         "errors of one": errors.falling(one, {}, median=True),
         "iterations": iterations.per_trial(trials, TABLE_1),

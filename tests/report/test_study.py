@@ -11,6 +11,7 @@ from replication.evidence.tables import sets_table
 from replication.paper.published import FIGURE_5, TABLE_1
 from replication.paper.register import ChoiceError
 from replication.report.study import Study
+from replication.trials.measures import ALONG
 
 FEW = {"episodes": 60, "horizon": 40}
 
@@ -47,6 +48,12 @@ def test_the_table_has_the_sets_beside_the_methods(study: Study) -> None:
     assert study.trials.head(len(study.main)).equals(study.main)
     saved = sets_table(study.trials, {**study.conditions, **study.sets})
     assert dict(zip(saved["set"], saved["n"], strict=True)) == {"opposite": 2, NAMED: 3, GENERAL: 3}
+
+
+def test_q_along_the_path_is_there_if_asked_for(study: Study, own: str, tmp_path: Path) -> None:
+    """The table of the open maze has it, others are not made larger by it."""
+    assert not {*ALONG} & {*study.trials}
+    assert {*ALONG} <= {*make(tmp_path, own, path=True).trials}
 
 
 def test_methods_have_equally_many_trials_of_their_own(own: str, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -14,7 +16,7 @@ from replication.irl import Trial
 from replication.report.drawing import READING_MARKS
 from replication.report.maze import places
 from replication.report.picture import Picture
-from replication.report.why import ALONE, why
+from replication.report.why import ALONE, MARKED, why
 from replication.trials.condition import Condition
 from replication.trials.results import Results
 from tests.report.legible import assert_legible
@@ -55,15 +57,39 @@ def figure(picture: Picture) -> Figure:
     return picture.draw(picture.numbers)
 
 
-def test_the_way_is_that_after_the_first_update(
-    figure: Figure, trial: Trial, small_demos: Demos
+def test_the_walk_is_that_after_the_first_update(
+    picture: Picture, figure: Figure, trial: Trial, small_demos: Demos
 ) -> None:
-    """On the map are the expert's path, all of the agent's trajectory, and a dot at its end."""
-    path, way, end = (np.asarray(line.get_xydata()) for line in figure.axes[0].lines[-3:])
+    """On the map are the expert's path and each move of the agent, with how often it is made."""
     maze = as_maze(small_demos.environment)
+    path = np.asarray(figure.axes[0].lines[-1 - _bumps(picture)].get_xydata())
     np.testing.assert_allclose(path.T, places(maze, small_demos.correct[0].states))
-    np.testing.assert_allclose(way.T, places(maze, trial.episodes[1].states))
-    np.testing.assert_array_equal(end, way[-1:])
+    episode = trial.episodes[1]
+    moves = picture.numbers[picture.numbers["part"] == "move"]
+    assert moves["count"].sum() == len(episode.actions)
+    pairs = {*zip(episode.states[:-1].tolist(), episode.actions.tolist(), strict=True)}
+    assert len(moves) == len(pairs)
+    correct = moves[moves["kind"] == "correct"]
+    steps = itertools.pairwise(zip(*places(maze, small_demos.correct[0].states), strict=True))
+    expert = {(*start, *end) for start, end in steps}
+    shown = correct[["x", "y", "to_x", "to_y"]].itertuples(index=False, name=None)
+    assert set(shown) <= expert
+
+
+def _bumps(picture: Picture) -> int:
+    moves = picture.numbers[picture.numbers["part"] == "move"]
+    return int(((moves["x"] == moves["to_x"]) & (moves["y"] == moves["to_y"])).sum())
+
+
+def test_the_walk_is_in_view(picture: Picture, figure: Figure) -> None:
+    """The part of the map that is shown has every cell of the walk, and ends within the map."""
+    moves = picture.numbers[picture.numbers["part"] == "move"]
+    for name, size in (("x", 7), ("y", 6)):
+        low, high = getattr(figure.axes[0], f"get_{name}lim")()
+        both = moves[[name, f"to_{name}"]]
+        assert low < both.min(axis=None)
+        assert both.max(axis=None) < high
+        assert -0.5 <= low < high <= size - 0.5
 
 
 def test_bars_are_the_shares(figure: Figure) -> None:
@@ -108,18 +134,16 @@ def test_texts_are_legible(figure: Figure) -> None:
     assert_legible(figure)
 
 
-def test_the_legend_names_both_ways_and_all_readings(figure: Figure) -> None:
-    """Who sees the map or a mark finds in the legend what it is."""
+def test_the_legend_names_moves_and_readings(picture: Picture, figure: Figure) -> None:
+    """Who sees the map or a mark finds in the legend what it is, and how many moves there are."""
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "the expert's path",
-        "the agent's after the first update",
-        "Fᵢ (printed)",
-        "Fᵢ₊₁ (updated)",
-        "Fᵢ, maximum at once",
-    ]
-    drawn = {line.get_color() for panel in figure.axes for line in panel.lines}
-    assert {line.get_color() for line in legend.get_lines()} <= drawn
+    labels = [text.get_text() for text in legend.get_texts()]
+    moves = picture.numbers[picture.numbers["part"] == "move"]
+    counts = moves.groupby("kind")["count"].sum()
+    named = [f"{text}: {counts[kind]:.0f} moves" for kind, text in MARKED.items() if kind in counts]
+    readings = ["Fᵢ (printed)", "Fᵢ₊₁ (updated)", "Fᵢ, maximum at once"]
+    assert labels == ["the expert's path", *named, *readings]
+    assert len(named) > 1
 
 
 def test_words_have_the_shares(picture: Picture, trial: Trial) -> None:

@@ -19,8 +19,10 @@ from replication.irl import Trial
 from replication.irl.agent import Episode
 from replication.trials.condition import Condition
 from replication.trials.measures import (
+    ALONG,
     KINDS,
     Report,
+    along_path,
     early_iterations,
     error_histories,
     factors,
@@ -28,6 +30,7 @@ from replication.trials.measures import (
     marked_pairs,
     measure,
     measure_trials,
+    numbers_in,
     planned_trials,
 )
 from replication.trials.results import Results, digest
@@ -238,6 +241,38 @@ def test_growth_by_hand(small_demos: Demos) -> None:
     rising = np.repeat(np.arange(9.0)[:, None], moves, axis=1)
     found = measured(made(small_demos, values=rising, rewards=-3 * rising), small_demos)
     assert (found["q_growth"], found["reward_growth"]) == (4.0, -12.0)
+
+
+@pytest.mark.parametrize("mid_term", [0.25, 0.5])
+def test_growth_along_the_path_is_in_the_order_of_its_steps(
+    small_demos: Demos, mid_term: float
+) -> None:
+    """Q is kept by state, and told by step: once for each step of the first demonstration."""
+    states = small_demos.correct[0].states[:-1]
+    on_path = np.unique(states)
+    values = np.arange(9.0)[:, None] * np.where(on_path == states[2], 1.234567, 0.0)
+    found = along_path(made(small_demos, values=values), small_demos, Report(mid_term=mid_term))
+    middle = round(8 * mid_term)
+    expected = {
+        "path_q": f"{middle * 1.234567:.3g}",
+        "path_q_growth": f"{(8 - middle) * 1.234567:.3g}",
+    }
+    for name, text in expected.items():
+        zeros = ["0"] * len(states)
+        assert found[name].split() == [*zeros[:2], text, *zeros[3:]]
+
+
+def test_growth_along_the_path_is_the_unified_methods(
+    conditions: dict[Key, Condition], results: Results
+) -> None:
+    """Other methods have none, and its mean is the growth that is judged, to three digits."""
+    table = measure_trials(results, conditions.values(), path=True)
+    assert list(table)[-2:] == list(ALONG)
+    own = table["method"] == "unified"
+    assert (table.loc[~own, list(ALONG)] == "").all(axis=None)
+    for text, growth in zip(table.loc[own, ALONG[1]], table.loc[own, "q_growth"], strict=True):
+        (steps,) = numbers_in([text])
+        assert steps.mean() == pytest.approx(growth, abs=0.005 * np.abs(steps).max())
 
 
 def test_trial_at_the_cap_is_told(small_demos: Demos) -> None:
