@@ -154,7 +154,9 @@ def run_notebooks(
                 due.add(run.name)
         _check([run for run in runs if run.name in due], checks or {}, scheduler)
         published = []
-        with Display(len(due), bars=sys.stderr.isatty()) as display:
+        # behind `| tee` the lines go another way than a bar, and would meet it on the terminal
+        bars = sys.stderr.isatty() and sys.stdout.isatty()
+        with Display(len(due), bars=bars) as display:
             for run in map(Run.again, runs):
                 if not is_due(run):
                     echo(f"{run.name}: fresh, nothing to do")
