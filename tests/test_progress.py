@@ -9,8 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from nbclient import NotebookClient
 
 from replication.progress import EVENTS, Count, Display, iteration_meter, trial_meter
+from tests.notebooks import write_notebook
 from tests.terminal import in_terminal, screen
 
 
@@ -223,3 +225,17 @@ def test_a_log_that_is_closed_is_no_fault(tmp_path: Path, monkeypatch: pytest.Mo
     report(tmp_path / "events", 1, 2, 2, 5)
     with Display(1, bars=False) as display:
         display.poll(tmp_path / "events")
+
+
+def test_a_cell_shows_a_line(tmp_path: Path) -> None:
+    """In a notebook that is run by hand, one output tells how far the trials are."""
+    code = (
+        "from replication.progress import trial_meter\n"
+        "with trial_meter(4) as report:\n"
+        "    for _ in range(4): report(1, 1)"
+    )
+    node = write_notebook(tmp_path / "toy.ipynb", code)
+    client = NotebookClient(node, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+    (output,) = client.execute().cells[-1].outputs
+    assert output.output_type == "display_data"
+    assert output.data["text/plain"].startswith("100 % of 4 trials, ")
