@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from replication import files
 from replication.files import shown_as, write_file
-from replication.pipeline.notebook import refuse, with_values
+from replication.pipeline.notebook import assignment, refuse
 from replication.pipeline.plan import Run
 
 HAND = "build/hand"
@@ -34,3 +38,23 @@ def copy_notebook(run: Run) -> Path:
     from replication.pipeline.rendering import as_text  # loads nbformat
 
     return write_file(copy, as_text(node))
+
+
+def with_values(source: str, values: Mapping[str, Any]) -> str:
+    """Return the text of a parameters cell with other values in it.
+
+    Examples
+    --------
+    >>> with_values("trials: int = 1000  # of each method", {"trials": 4})
+    'trials: int = 4  # of each method'
+    """
+    lines = [line.encode() for line in source.split("\n")]  # ast counts bytes
+    for statement in reversed(ast.parse(source).body):
+        name, old = assignment(statement)
+        if name in values:
+            first, last = old.lineno - 1, (old.end_lineno or old.lineno) - 1
+            value = values[name]
+            text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+            new = lines[first][: old.col_offset] + text.encode() + lines[last][old.end_col_offset :]
+            lines[first : last + 1] = [new]
+    return b"\n".join(lines).decode()

@@ -213,7 +213,7 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
         text = source.splitlines()[statement.lineno - 1].strip()
         place = f"line {statement.lineno} of the parameters cell, `{text}`"
         try:
-            name, node = _assignment(statement)
+            name, node = assignment(statement)
             value = ast.literal_eval(node)
         except (TypeError, ValueError, RecursionError, MemoryError):
             only = "only `name = literal` is allowed here; move other code to the next cell"
@@ -227,7 +227,7 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
     return literals
 
 
-def _assignment(statement: ast.stmt) -> tuple[str, ast.expr]:
+def assignment(statement: ast.stmt) -> tuple[str, ast.expr]:
     """Return the name and the value of `name = value` or `name: type = value`."""
     match statement:
         case ast.Assign(targets=[ast.Name(id=name)], value=value):
@@ -235,26 +235,6 @@ def _assignment(statement: ast.stmt) -> tuple[str, ast.expr]:
         case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value):
             return name, value
     raise ValueError("it is no assignment of one value to one name")
-
-
-def with_values(source: str, values: Mapping[str, Any]) -> str:
-    """Return the text of a parameters cell with other values in it.
-
-    Examples
-    --------
-    >>> with_values("trials: int = 1000  # of each method", {"trials": 4})
-    'trials: int = 4  # of each method'
-    """
-    lines = [line.encode() for line in source.split("\n")]  # ast counts bytes
-    for statement in reversed(ast.parse(source).body):
-        name, old = _assignment(statement)
-        if name in values:
-            first, last = old.lineno - 1, (old.end_lineno or old.lineno) - 1
-            value = values[name]
-            text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-            new = lines[first][: old.col_offset] + text.encode() + lines[last][old.end_col_offset :]
-            lines[first : last + 1] = [new]
-    return b"\n".join(lines).decode()
 
 
 def _is_json(value: Any) -> bool:

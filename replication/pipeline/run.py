@@ -154,8 +154,7 @@ def run_notebooks(
                 due.add(run.name)
         _check([run for run in runs if run.name in due], checks or {}, scheduler)
         published = []
-        # behind `| tee` the lines go another way than a bar, and would meet it on the terminal
-        bars = sys.stderr.isatty() and sys.stdout.isatty()
+        bars = sys.stderr.isatty() and sys.stdout.isatty()  # not behind `| tee`
         with Display(len(due), bars=bars) as display:
             for run in map(Run.again, runs):
                 if not is_due(run):
