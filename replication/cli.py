@@ -13,6 +13,7 @@ import math
 import os
 import re
 import secrets
+import shlex
 import shutil
 import signal
 import sys
@@ -24,7 +25,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -55,7 +55,7 @@ class OneLineErrors(click.Group):
             code: Any = command()
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.message)
-            sys.exit(2)
+            sys.exit(0)
         except click.ClickException as error:
             context = getattr(error, "ctx", None)
             more = f" (see {context.command_path} --help)" if context else ""
@@ -99,8 +99,32 @@ def _is_interruption(error: BaseException | None) -> bool:
 
 
 def _end(message: str, code: int = 2) -> NoReturn:
-    click.echo(f"error: {message}", err=True)
+    _say(f"error: {message}", err=True)
     sys.exit(code)
+
+
+COLOURS = {
+    "error:": "red",
+    **dict.fromkeys(("warning:", "stale", "missing", "NOT converged"), "yellow"),
+    **dict.fromkeys(("everything is fresh", "everything agrees", "converged"), "green"),
+}
+"""Words that are coloured where a line begins, or behind its first colon."""
+
+
+def _say(text: str, *, err: bool = False) -> None:
+    """Print a line beside whatever bar there is; click keeps colours to terminals."""
+    from replication.progress import between_bars
+
+    if not os.environ.get("NO_COLOR"):
+        words = "|".join(COLOURS)
+        pattern = rf"^((?:\w[^:]*: )??)({words})(?=[ ;]|$)"
+        text = re.sub(pattern, lambda found: found[1] + _coloured(found[2]), text, count=1)
+    with between_bars():
+        click.echo(text, err=err)
+
+
+def _coloured(word: str) -> str:
+    return click.style(word, fg=COLOURS[word])
 
 
 def _values(_: click.Context, __: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
@@ -157,6 +181,14 @@ def folder(text: str, default: Path | None = None) -> Callable[..., Any]:
     return click.option("--out", type=FILE, default=default, metavar="FOLDER", help=text)
 
 
+def _complete(_: click.Context, __: click.Parameter, begun: str) -> list[str]:
+    """Return the notebooks that a shell may complete a word to."""
+    return [path.stem for path in _all_notebooks() if path.stem.startswith(begun)]
+
+
+notebooks_argument = click.argument(
+    "notebooks", metavar="[NOTEBOOK]...", nargs=-1, shell_complete=_complete
+)
 jobs_option = number("--jobs", 1, "Worker processes; one for each usable core by default.")
 profile_option = click.option(
     "--profile",
@@ -197,7 +229,7 @@ def demos_group() -> None:
 
 
 @app.command(epilog="Example: replicate run open_maze --profile quick -p set_trials 4")
-@click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
+@notebooks_argument
 @profile_option
 @jobs_option
 @number("--seed", 0, "Root seed; the notebook's by default.")
@@ -230,12 +262,12 @@ def run(
     parameters: dict[str, Any],
     **options: Any,
 ) -> None:
-    """Run notebooks, all by default, and publish their figures, tables and data.
+    """Run notebooks and publish what they give.
 
-    A notebook is skipped if nothing that its outputs depend on has changed. Outputs go to figures;
-    those of --profile quick to build/quick, and those of a run with --seed or with -p (but for jobs
-    and store) to build/custom. If a notebook, its data or the code was edited since its outputs
-    were published, they go to build/edited unless --publish is given.
+    All notebooks by default. One is skipped if nothing that its outputs depend on has changed.
+    Outputs go to figures; those of --profile quick to build/quick, and those of a run with --seed
+    or with -p (but for jobs and store) to build/custom. If a notebook, its data or the code was
+    edited since its outputs were published, they go to build/edited unless --publish is given.
     """
     from replication.pipeline.notebook import RunError
     from replication.pipeline.run import destination, run_notebooks
@@ -248,7 +280,7 @@ def run(
     if why and check:
         raise UserError(f"{why}; so there is nothing to --check against")
     if why:
-        click.echo(f"{why}: the outputs of this run go to {_short(target)}")
+        _say(f"{why}: the outputs of this run go to {_short(target)}")
     try:
         published = run_notebooks(
             paths,
@@ -256,7 +288,7 @@ def run(
             publish=publish,
             force=force,
             checks=CHECKS,
-            echo=click.echo,
+            echo=_say,
             **asked,
             **options,
         )
@@ -271,17 +303,14 @@ def run(
     except UserError as error:
         _end(str(error))
     new = [file for notebook in published for file in notebook.files]
-    for table in new:
-        if table.suffix == ".md" and table.parent.name != "claims":
-            title = f"{table.parent.name}/{table.name}"
-            click.echo(f"\n{title}\n\n{table.read_text(encoding='utf-8').strip()}")
-    click.echo(f"\noutputs ({len(new)} new): {_short(target)}")
+    _say(f"outputs ({len(new)} new): {_short(target)}")
     verdicts = target / "claims" / "verdicts.csv"
     if any(path.stem == "claims" for path in paths) and verdicts.exists():
         from replication.evidence.tables import read_table
         from replication.report.readable import verdict_lines
 
-        click.echo("\nThe paper's claims:\n" + "\n".join(verdict_lines(read_table(verdicts))))
+        lines = verdict_lines(read_table(verdicts), shutil.get_terminal_size().columns)
+        _say("\n".join(["", "The paper's claims:", *lines]))
     changed = [_short(file) for notebook in published for file in notebook.changed]
     if check and changed:
         _end(f"other bytes than published before: {', '.join(changed)}", 1)
@@ -310,9 +339,10 @@ CHECKS: dict[str, Callable[[], object]] = {
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @outputs_options
 def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
-    """Redraw figures, all by default, from the tables beside them; nothing is executed.
+    """Redraw figures from the tables beside them.
 
-    A NAME is that of a figure, such as fig05 or open_maze/fig05, or of a notebook.
+    All figures by default; nothing is executed. A NAME is that of a figure, such as fig05 or
+    open_maze/fig05, or of a notebook.
     """
     from replication.pipeline.folders import outputs_folder
     from replication.pipeline.redraw import redraw
@@ -339,28 +369,34 @@ def _drawn(code: str, table: Path) -> dict[str, bytes]:
 
 @app.command(epilog="Example: replicate status")
 @outputs_options
-def status(profile: str, out: Path | None) -> None:
-    """Show which figures and tables are up to date, why others are not, and what to do."""
+@click.option("--all", is_flag=True, help="Show every notebook, figure and table.")
+def status(profile: str, out: Path | None, all: bool) -> None:
+    """Show what is not up to date, and why.
+
+    One line when all is well; otherwise also the command that brings it up to date.
+    """
     from replication.pipeline.status import status_lines
 
     options = ["--profile", profile] if profile != "paper" else []
     options += ["--out", str(out)] if out else []
-    click.echo("\n".join(status_lines(*_prepared(profile, out), options)))
+    for line in status_lines(*_prepared(profile, out), options, all=all):
+        _say(line)
 
 
 @app.command(epilog="Example: replicate verify open_maze")
-@click.argument("notebooks", metavar="[NOTEBOOK]...", nargs=-1)
+@notebooks_argument
 @outputs_options
 @jobs_option
 @number("--every", 1, "Recompute one trial in so many.", default=20)
 @number("--seed", 0, "Of the sample of trials; drawn anew by default.")
 @number("--timeout", 1, "Time that one cell may take.", default=3600, metavar="SECONDS")
 def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None:
-    """Prove the outputs of notebooks, by default of all.
+    """Prove the outputs of notebooks.
 
-    What should be there follows from the notebooks and environment.lock. Each notebook is executed
-    again with its published trials, and must give the same bytes. Of the trials, a random sample is
-    computed again from nothing. Exit code 0 if everything agrees, else 1.
+    Those of all notebooks by default. What should be there follows from the notebooks and
+    environment.lock. Each notebook is executed again with its published trials, and must give the
+    same bytes. Of the trials, a random sample is computed again from nothing. Exit code 0 if
+    everything agrees, else 1.
     """
     import joblib
 
@@ -370,8 +406,8 @@ def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None
     number = 0
     for line in _disagreements(names, jobs=jobs or joblib.cpu_count(), **options):
         number += 1
-        click.echo(f"error: {line}", err=True)
-    click.echo("everything agrees" if not number else f"{number} things do not agree")
+        _say(f"error: {line}", err=True)
+    _say("everything agrees" if not number else f"{number} things do not agree")
     sys.exit(int(number > 0))
 
 
@@ -392,9 +428,9 @@ def _disagreements(
 
     every_run, target = _prepared(profile, out)
     runs = [run for run in every_run if not names or run.name in names]
-    click.echo("comparing the installed packages with environment.lock")
+    _say("comparing the installed packages with environment.lock")
     yield from verify.verify_packages(files.PROJECT / "environment.lock")
-    click.echo(f"comparing what is in {target.name} with what the notebooks declare")
+    _say(f"comparing what is in {target.name} with what the notebooks declare")
     yield from verify.verify_folder(every_run, target)
     sound = []
     for run in runs:
@@ -403,13 +439,11 @@ def _disagreements(
         sound += [] if wrong else [run]
     for run in sound:
         with files.scratch_folder() as scratch:
-            yield from verify.verify_outputs(
-                run, scratch.resolve(), timeout=timeout, echo=click.echo
-            )
+            yield from verify.verify_outputs(run, scratch.resolve(), timeout=timeout, echo=_say)
     root = secrets.randbits(32) if seed is None else seed
 
     def report(number: int) -> None:
-        click.echo(f"recomputing {number} trials, one in {every}, drawn with --seed {root}")
+        _say(f"recomputing {number} trials, one in {every}, drawn with --seed {root}")
 
     yield from recompute_trials(
         {
@@ -423,6 +457,25 @@ def _disagreements(
         jobs=jobs,
         report=report,
     )
+
+
+@app.command(epilog="Example: replicate copy open_maze --profile quick")
+@click.argument("notebook", shell_complete=_complete)
+@profile_option
+def copy(notebook: str, profile: str) -> None:
+    """Copy a notebook to build/hand, to work on it by hand.
+
+    The copy has the profile's values in its first code cell. Nothing that is published or kept
+    under version control changes when it is executed or saved.
+    """
+    from replication.pipeline.by_hand import HAND, copy_notebook
+    from replication.pipeline.folders import outputs_folder
+    from replication.pipeline.plan import prepare
+
+    (run,) = prepare([_notebook(notebook)], profile=profile, out=outputs_folder(profile))
+    made = copy_notebook(run)
+    _say(f"copy: {_short(made)}, which writes to {HAND}/{run.name}")
+    _say(f"open it: {shlex.join(['jupyter', 'lab', _short(made)])}")
 
 
 @app.command(epilog="Example: replicate clean --dry-run")
@@ -439,7 +492,10 @@ def clean(profile: str, out: Path | None, dry_run: bool) -> None:
 @app.command(epilog="Example: replicate site")
 @folder("Where the site goes.", Path("build/site"))
 def site(out: Path) -> None:
-    """Build the report from the published results; nothing is executed."""
+    """Build the report from published results.
+
+    Nothing is executed.
+    """
     from replication.site.build import build_site
 
     _catch_signals()
@@ -469,18 +525,26 @@ def site(out: Path) -> None:
 )
 @parameters_option
 @folder("Where the result goes.", Path("build/learn"))
+@click.option("--strict", is_flag=True, help="Exit code 1 if the result has not converged.")
 def learn(
-    file: Path, method: str, seed: int, incorrect: str | None, parameters: dict[str, Any], out: Path
+    file: Path,
+    method: str,
+    seed: int,
+    incorrect: str | None,
+    parameters: dict[str, Any],
+    out: Path,
+    strict: bool,
 ) -> None:
     """Learn a reward from the demonstrations of a file.
 
     Writes TASK-METHOD.json and a picture of it. A result that has not converged is a result: it
-    is reported as such, with exit code 0.
+    is reported as such, with exit code 0 unless --strict is given.
     """
     from replication.demos.files import load_demos
     from replication.fitting import fit
     from replication.irl import get_method
     from replication.paper.params import Params
+    from replication.progress import iteration_meter
     from replication.report.learned import fit_figure
     from replication.report.style import save_figure
 
@@ -496,17 +560,19 @@ def learn(
     stem = out / f"{demos.task}-{method}"
     saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
     _check_targets(saved, picture, source=file)
-    click.echo(f"{demos.task}, {method}: learning")
-    result = fit(demos, method=method, params=params, seed=seed)
+    _say(f"{demos.task}, {method}: learning")
+    with iteration_meter() as report:
+        result = fit(demos, method=method, params=params, seed=seed, report=report)
     result.save(saved)
     figure = fit_figure(demos, result.actions, result.weights, result.errors)
     save_figure(figure, stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
-    click.echo(
+    _say(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
         f"d = {result.errors[-1]:.4g}"
     )
-    click.echo(f"result:  {_short(saved)}\npicture: {_short(picture)}")
+    _say(f"result:  {_short(saved)}\npicture: {_short(picture)}")
+    sys.exit(int(strict and not result.converged))
 
 
 @demos_group.command(
@@ -562,11 +628,11 @@ def check(paths: tuple[Path, ...]) -> None:
         try:
             doubts = check_demos(path)
         except DemoError as error:
-            click.echo(f"error: {error}", err=True)
+            _say(f"error: {error}", err=True)
             failed = True
             continue
         for doubt in doubts:
-            click.echo(f"warning: {doubt}")
+            _say(f"warning: {doubt}")
         if not doubts:
             click.echo(f"{path}: ok")
     sys.exit(int(failed))
@@ -585,7 +651,7 @@ def _plain_warnings() -> Iterator[None]:
     """Show warnings in one line each."""
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
-        click.echo(f"warning: {message}", err=True)
+        _say(f"warning: {message}", err=True)
 
     with warnings.catch_warnings():
         warnings.showwarning = show
@@ -598,20 +664,24 @@ def _plain_warnings() -> Iterator[None]:
 @app.command(epilog="Example: replicate choices ALPHA")
 @click.argument("id", required=False)
 def choices(id: str | None) -> None:
-    """List what the paper leaves open, what we chose, and what else is accepted.
+    """List what the paper leaves open.
 
-    With an ID, show that choice in full.
+    Each choice has our default and, in brackets, what else is accepted. With an ID, show that
+    choice in full.
     """
+    from replication.paper.groups import choice_groups
     from replication.paper.register import load_choices
 
     entries = load_choices()
-    width = shutil.get_terminal_size().columns
     if id is None:
-        rows = [("ID", "DEFAULT", "ALTERNATIVES", "FIELD, DATA OR CODE")]
-        for entry in entries.values():
-            place = entry.field or entry.data or entry.code
-            rows.append((entry.id, str(entry.default), _accepted(entry), place))
-        _print_table(rows, width)
+        column = max(map(len, entries)) + 4
+        for group, members in choice_groups().items():
+            click.echo(f"{group[0].upper()}{group[1:]}")
+            for entry in members:
+                others = f"{'or ' * bool(entry.alternatives)}{_accepted(entry)}"
+                value = f"{entry.default} ({others})" if others else str(entry.default)
+                _print_item(f"  {entry.id}", value, column)
+        click.echo("\nreplicate choices ID shows one of them in full")
         return
     if id.upper() not in entries:
         raise UserError(unknown(id.upper(), entries, "choice"))
@@ -620,8 +690,7 @@ def choices(id: str | None) -> None:
     for key in fields:
         value = _accepted(entry) if key == "alternatives" else str(getattr(entry, key))
         if value:
-            head = f"{key + ':':<14}"
-            click.echo(textwrap.fill(head + value, width, subsequent_indent=" " * 14))
+            _print_item(f"{key}:", value, 14)
 
 
 def _accepted(entry: Any) -> str:
@@ -630,15 +699,12 @@ def _accepted(entry: Any) -> str:
     return ", ".join(map(str, entry.alternatives))
 
 
-def _print_table(rows: Sequence[tuple[str, ...]], width: int) -> None:
-    """Print rows in columns; the first is never broken, the others share what is left."""
-    first = max(len(row[0]) for row in rows)
-    share = max(12, (width - first) // (len(rows[0]) - 1) - 2)
-    for row in rows:
-        cells = [[row[0]], *(textwrap.wrap(cell, share) for cell in row[1:])]
-        for parts in zip_longest(*cells, fillvalue=""):
-            padded = [f"{part:<{share if at else first}}" for at, part in enumerate(parts)]
-            click.echo("  ".join(padded).rstrip())
+def _print_item(head: str, text: str, column: int) -> None:
+    """Print a name, and from a column on a text, whose words are never broken."""
+    width = shutil.get_terminal_size().columns
+    options = {"break_long_words": False, "break_on_hyphens": False}
+    first, *rest = textwrap.wrap(text, max(width - column, 20), **options)  # type: ignore[arg-type]
+    click.echo("\n".join([head.ljust(column) + first, *(" " * column + line for line in rest)]))
 
 
 # --- what the commands share -----------------------------------------------------------------

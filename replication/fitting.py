@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +17,17 @@ from replication.demos.files import demos_document, parse_demos
 from replication.demos.model import Demos
 from replication.errors import UserError
 from replication.files import FileError, read_json, write_file
+from replication.irl import Method
+from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
 from replication.trials.condition import Condition
 
 FORMAT = "replication-fit"
 VERSION = 1
+
+
+Array = NDArray[np.float64]
 
 
 class FitError(UserError):
@@ -116,8 +123,31 @@ _ARRAYS: dict[str, type] = {
 }
 
 
+@dataclass(frozen=True)
+class _Watched(Condition):
+    """A condition that reports each weight update of its trial, and the error before it."""
+
+    report: Callable[[int, float], None]
+
+    @property
+    def rule(self) -> Method:
+        rule = super().rule
+        numbers = count(1)
+
+        def update(w: Array, memory: Array, mu_e: Array, mu_i: Array, *rest: Any) -> Any:
+            self.report(next(numbers), norm(mu_e - mu_i))
+            return rule.update(w, memory, mu_e, mu_i, *rest)
+
+        return replace(rule, update=update)
+
+
 def fit(
-    demos: Demos, *, method: str = "unified-incorrect", params: Params | None = None, seed: int = 0
+    demos: Demos,
+    *,
+    method: str = "unified-incorrect",
+    params: Params | None = None,
+    seed: int = 0,
+    report: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Learn reward weights and a policy from demonstrations.
 
@@ -131,6 +161,8 @@ def fit(
         Parameters; by default the registered ones with every incorrect demonstration of the file.
     seed
         Root seed: the result equals trial 0 of :func:`replication.trials.run.run_trials` with it.
+    report
+        Is called at each weight update, with its number and the error d before it.
 
     Raises
     ------
@@ -154,7 +186,8 @@ def fit(
     (True, True)
     """
     chosen = params if params is not None else Params.of(incorrect="all")
-    condition = Condition(demos, method, chosen)
+    given = (demos, method, chosen)
+    condition = Condition(*given) if report is None else _Watched(*given, report)
     trial = condition.trial(seed=trial_seeds(seed, 1)[0])
     return Fit(
         demos=demos,

@@ -31,9 +31,11 @@ from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.pipeline import run
 from tests.notebooks import write_notebook
+from tests.terminal import in_terminal
 
 COMMANDS = [
-    *(["run"], ["draw"], ["status"], ["verify"], ["clean"], ["site"], ["learn"], ["choices"]),
+    *(["run"], ["draw"], ["status"], ["verify"], ["copy"], ["clean"], ["site"], ["learn"]),
+    ["choices"],
     *(["demos", name] for name in ("make", "check", "schema")),
 ]
 
@@ -86,14 +88,14 @@ def demo_file(tmp_path: Path, small_demos: Demos) -> Path:
 # --- run -------------------------------------------------------------------------------------
 
 
-def test_run_writes_shows_and_tells(kernel: Path) -> None:
-    """All notebooks run by default; tables are shown, and the folders are named."""
+def test_run_writes_and_tells(kernel: Path) -> None:
+    """All notebooks run by default; each has a line, and the folder of the outputs is named."""
     words = ["-p", "name", "x=y", "-p", "trials", "-4", "--seed", "9", "--jobs", "2"]
     result = replicate("run", "--profile", "quick", *words)
     assert result.exit_code == 0
     table = "| -4 | 'x=y' | 9 | 2 |"
     assert (kernel / "build" / "custom" / "toy" / "seen.md").read_text() == table
-    assert table in result.stdout
+    assert "toy: 1 output in " in result.stdout
     assert f"outputs (2 new): {kernel / 'build' / 'custom'}\n" in result.stdout
     assert not (kernel / "figures").exists()
 
@@ -116,22 +118,6 @@ def test_only_the_paper_as_it_is_goes_to_figures(
     assert [path.parent for path in project.rglob("seen.md")] == [project / folder / "toy"]
 
 
-def test_tables_are_shown_by_their_names(project: Path) -> None:
-    """Each table has its name, with that of its notebook, in the order of the notebooks."""
-    names = ["main.csv", "main.md", "sets.csv", "sets.md"]
-    for name in ("a", "b"):
-        code = (
-            "from pathlib import Path\n"
-            f"[(Path(out) / file).write_text('| {name} |\\n') for file in {names}]"
-        )
-        write_notebook(project / "notebooks" / f"{name}.ipynb", code, tables=["main", "sets"])
-    shown = replicate("run", "a", "b").stdout
-    titles = re.findall(r"^(\S+)\n\n\| (\S+) \|$", shown, flags=re.MULTILINE)
-    assert titles == [(f"{n}/{t}.md", n) for n in ("a", "b") for t in ("main", "sets")]
-    assert "\noutputs (10 new): " in shown
-    assert "claims" not in shown
-
-
 @pytest.mark.parametrize("out", [None, "elsewhere"])
 def test_claims_are_shown_last(
     project: Path, monkeypatch: pytest.MonkeyPatch, out: str | None
@@ -150,12 +136,15 @@ def test_claims_are_shown_last(
     )
     write_notebook(project / "notebooks" / "claims.ipynb", code, tables=["verdicts"])
     monkeypatch.chdir(project)
+    monkeypatch.setenv("COLUMNS", "80")
     shown = replicate("run", "claims", *(["--out", out] if out else [])).stdout
     assert "long table" not in shown
+    assert all(len(line) <= 80 for line in shown.splitlines() if "outputs" not in line)
     assert shown.index("outputs (3 new)") < shown.index("The paper's claims:")
-    assert shown.splitlines()[-3:] == [
+    assert shown.splitlines()[-4:] == [
         "The paper's claims:",
-        "faster than AdaBoost-IRL  shown under Fᵢ (printed), inconclusive under Fᵢ₊₁ (updated)",
+        "faster than AdaBoost-IRL  shown under Fᵢ (printed), inconclusive under Fᵢ₊₁",
+        "                          (updated)",
         "SD-B                      not testable: used",
     ]
 
@@ -339,7 +328,8 @@ def test_status_leads_from_missing_to_fresh(project: Path) -> None:
     assert shown.startswith("toy: missing\n")
     assert shown.endswith("to bring figures up to date: replicate run toy\n")
     assert replicate("run", "toy").exit_code == 0
-    shown = replicate("status").stdout
+    assert replicate("status").stdout == "everything is fresh; replicate verify proves it\n"
+    shown = replicate("status", "--all").stdout
     assert re.match(r"toy: fresh \(\d+ s, just now\)\n    fresh    seen \.md\n", shown)
     assert "toy: missing" in replicate("status", "--profile", "quick").stdout
     (project / "figures" / "toy" / "seen.md").write_text("mine")
@@ -401,7 +391,7 @@ def test_an_edited_notebook_goes_elsewhere_and_says_so(project: Path) -> None:
     assert seen.read_bytes() == before
     assert "toy: stale" in replicate("status").stdout
     assert replicate("run", "--publish").exit_code == 0
-    assert "toy: fresh" in replicate("status").stdout
+    assert replicate("status").stdout.startswith("everything is fresh")
 
 
 def test_clean_removes_what_no_notebook_declares(project: Path) -> None:
@@ -416,7 +406,7 @@ def test_clean_removes_what_no_notebook_declares(project: Path) -> None:
     assert sorted((project / "figures").rglob("*")) == [p for p in before if p.name != "old.png"]
     assert replicate("clean").stdout == ""
     assert "has no folder with a provenance.json" in refused("clean", "--out", project)
-    assert "toy: fresh" in replicate("status").stdout
+    assert replicate("status").stdout.startswith("everything is fresh")
 
 
 # --- learn -----------------------------------------------------------------------------------
@@ -443,6 +433,9 @@ def test_learn_says_that_it_has_not_converged(demo_file: Path, tmp_path: Path) -
     result = replicate("learn", demo_file, *words, "-p", "max_iterations", cap)
     assert result.exit_code == 0
     assert f"NOT converged after {cap} iteration" in result.stdout
+    strict = replicate("learn", demo_file, *words, "-p", "max_iterations", cap, "--strict")
+    assert (strict.exit_code, strict.stdout) == (1, result.stdout)
+    assert replicate("learn", demo_file, "--out", tmp_path, "--strict").exit_code == 0
 
 
 def test_learn_refuses_in_one_line(demo_file: Path, tmp_path: Path) -> None:
@@ -573,18 +566,37 @@ def test_schema_is_printed() -> None:
     assert json.loads(replicate("demos", "schema").stdout) == json_schema()
 
 
-def test_choices_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every entry is in the table, which keeps to the terminal, and each is shown whole."""
-    monkeypatch.setenv("COLUMNS", "120")
+@pytest.mark.parametrize("columns", [80, 110])
+def test_choices_are_listed(monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
+    """Every choice stands under its group, keeps to the terminal and breaks no word."""
+    monkeypatch.setenv("COLUMNS", str(columns))
     table = replicate("choices").stdout
-    assert max(map(len, table.splitlines())) <= 120
-    joined = re.sub(r"\s", "", table)
+    assert max(map(len, table.splitlines())) <= columns
+    assert re.search(
+        r"^The weight update\n  F-INDEX +printed \(or updated, at-once\)$", table, re.M
+    )
+    words = set(table.split())
     for id, one in load_choices().items():
-        assert id in joined
-        whole = " ".join(replicate("choices", id.lower()).stdout.split())
-        assert id in whole
-        assert one.rule in whole
+        assert {id, *str(one.default).split()} <= words
+        whole = replicate("choices", id.lower()).stdout
+        assert max(map(len, whole.splitlines())) <= columns
+        assert {id, one.field or one.data or one.code, *one.rule.split()} <= {*whole.split()}
     assert "(did you mean 'ALPHA'?)" in refused("choices", "alpa")
+
+
+# --- a copy to work on -----------------------------------------------------------------------
+
+
+def test_a_copy_is_made_once(project: Path) -> None:
+    """It has the profile's values, writes beside itself, and what was done in it is never lost."""
+    shown = replicate("copy", "toy", "--profile", "quick").stdout
+    copy = project / "build" / "hand" / "toy.ipynb"
+    assert f"open it: jupyter lab {copy}\n" in shown
+    assert "trials = 2\n" in nbformat.read(copy, as_version=4).cells[0].source
+    copy.write_text("mine")
+    assert "toy.ipynb: is there already" in refused("copy", "toy")
+    assert copy.read_text() == "mine"
+    assert "(did you mean 'toy'?)" in refused("copy", "toi")
 
 
 # --- draw ------------------------------------------------------------------------------------
@@ -703,6 +715,36 @@ def test_misuse_is_one_line() -> None:
     assert "see replicate run --help" in refused("run", "--jobs", "0")
     assert "No such command 'rum'" in refused("rum")
     assert replicate("run", "-h").stdout == replicate("run", "--help").stdout
+
+
+def test_the_command_alone_shows_its_help() -> None:
+    """Who types nothing else wants to know what there is, and has made no mistake."""
+    for words in ([], ["demos"]):
+        result = replicate(*words)
+        assert (result.exit_code, result.output) == (0, replicate(*words, "--help").stdout)
+
+
+def test_notebooks_are_completed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell that asks how a word may go on is told the names of notebooks."""
+    words = {"COMP_WORDS": "replicate run t", "COMP_CWORD": "2"}
+    asked = {"_REPLICATE_COMPLETE": "bash_complete", **words}
+    for name, value in asked.items():
+        monkeypatch.setenv(name, value)
+    assert CliRunner().invoke(cli.app, [], prog_name="replicate").stdout == "plain,toy\n"
+
+
+@pytest.mark.parametrize("columns", [80, 110])
+def test_colours_are_for_terminals(project: Path, columns: int) -> None:
+    """A terminal has colours unless NO_COLOR is set; a pipe never has."""
+    code = (
+        "import sys; from pathlib import Path; from replication import cli, files\n"
+        f"files.PROJECT = Path({str(project)!r}); cli.app(['status'])"
+    )
+    plain = replicate("status").output
+    assert plain.startswith("toy: missing\n")
+    told = in_terminal("-c", code, columns=columns, cwd=project)
+    assert told == plain.replace("missing", "\x1b[33mmissing\x1b[0m", 1)
+    assert in_terminal("-c", code, columns=columns, cwd=project, NO_COLOR="1") == plain
 
 
 def test_help_knows_every_method() -> None:

@@ -96,3 +96,11 @@ def test_another_seed_gives_another_course(fitted: Fit, small_demos: Demos) -> N
     again, other = (fit(small_demos, params=FEW, seed=seed) for seed in (3, 4))
     np.testing.assert_array_equal(again.q, fitted.q)
     assert not np.array_equal(other.q, fitted.q)
+
+
+def test_each_update_is_reported(fitted: Fit, small_demos: Demos) -> None:
+    """A report gets the error before each weight update, and changes nothing."""
+    told: list[tuple[int, float]] = []
+    again = fit(small_demos, params=FEW, seed=3, report=lambda *news: told.append(news))
+    assert told == list(enumerate(fitted.errors[:-1], start=1))
+    np.testing.assert_array_equal(again.q, fitted.q)

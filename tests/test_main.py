@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +12,10 @@ from typing import Any
 
 import pytest
 
+from replication import Demos, save_demos
 from replication.files import PROJECT
 from tests.notebooks import write_notebook
+from tests.terminal import in_terminal, screen
 
 PROGRAM = (
     "import sys; from pathlib import Path; from replication import files\n"
@@ -110,3 +114,61 @@ def test_it_is_a_module_as_well() -> None:
     words = [sys.executable, "-m", "replication", "--version"]
     done = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("replicate ")
+
+
+# --- in a terminal and in a pipe -------------------------------------------------------------
+
+COUNTING = """
+import time
+from pathlib import Path
+from replication.progress import trial_meter
+with trial_meter(5) as report:
+    for k in range(5):
+        time.sleep(0.2)
+        report(1, 10**6)
+(Path(out) / "a.md").write_text("| a | table | that | is | wide |" * 9)
+"""
+SHOWN = [
+    *(
+        ["--help"],
+        ["run", "--help"],
+        ["run"],
+        ["status"],
+        ["status", "--all"],
+        ["verify", "--seed", "1"],
+    ),
+    *(["choices"], ["choices", "EPSILON-FALL"], ["copy", "toy"], ["rum"]),
+    *(["learn", "mine.json"], ["demos", "check", "mine.json", "none.json"]),
+]
+
+
+def shown_in(project: Path, demos: Demos, *words: str, columns: int, terminal: bool) -> list[str]:
+    """Return the lines that a command leaves in a terminal, or that a file would get."""
+    write_notebook(project / "notebooks" / "toy.ipynb", COUNTING, data=["a.md"])
+    (project / "environment.lock").touch()
+    save_demos(demos, project / "mine.json")
+    if terminal:
+        told = in_terminal("-c", PROGRAM, str(project), *words, columns=columns, cwd=project)
+    else:
+        env = os.environ | {"COLUMNS": str(columns)}
+        both: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        told = replicate(project, *words, env=env, **both).stdout
+        assert not re.search(r"[\r\x1b]", told)
+        told = re.sub(r"^  \d+ % of 5 trials, .*\n", "", told, flags=re.MULTILINE)
+    told = re.sub(r"\d+\.\d s\b", "1.5 s", told)
+    return [line.rstrip() for line in screen(told, columns)]
+
+
+@pytest.mark.parametrize("columns", [80, 110])
+@pytest.mark.parametrize("words", SHOWN, ids=" ".join)
+def test_a_terminal_keeps_what_a_pipe_gets(
+    tmp_path: Path, small_demos: Demos, words: list[str], columns: int
+) -> None:
+    """Nothing is left of bars and running lines, and no line was written into another."""
+    (tmp_path / "a").mkdir()
+    piped = shown_in(tmp_path / "a", small_demos, *words, columns=columns, terminal=False)
+    shutil.move(tmp_path / "a", tmp_path / "used")
+    (tmp_path / "a").mkdir()
+    left = shown_in(tmp_path / "a", small_demos, *words, columns=columns, terminal=True)
+    assert left == piped
+    assert len("".join(left)) > 10

@@ -9,8 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from nbclient import NotebookClient
 
-from replication.progress import EVENTS, Display, TrialBar, trial_meter
+from replication.progress import EVENTS, Count, Display, iteration_meter, trial_meter
+from tests.notebooks import write_notebook
+from tests.terminal import in_terminal, screen
 
 
 @pytest.fixture
@@ -21,57 +24,29 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-# --- a bar or lines --------------------------------------------------------------------------
+# --- what is said of trials ------------------------------------------------------------------
 
 
-def test_a_log_has_one_line_each_tenth(
-    clock: list[float], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Each 10 % has one line with rate and time left, however many trials finish at a time."""
-    with TrialBar(200, shown=False, lines=True) as bar:
-        for _ in range(200):
-            clock[0] += 1.0
-            bar.update(1, 3_000_000)
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 10
-    assert told[0] == "   10 % of 200 trials, 3 M steps/s, 3 min left"
-    assert told[-2] == "   90 % of 200 trials, 3 M steps/s, 20 s left"
-    assert told[-1] == "  100 % of 200 trials, 3 M steps/s, 0 s left"
+def test_a_count_says_how_far_the_trials_are(clock: list[float]) -> None:
+    """It has rate and time left, and in the end the time that all took."""
+    count = Count(200)
+    assert count.line() == "0 % of 200 trials, 0 k steps/s"
+    for _ in range(3):
+        clock[0] += 20.0
+        count.add(20, 60_000_000)
+    assert count.line() == "30 % of 200 trials, 3 M steps/s, 2 min left"
+    clock[0] += 30.0
+    count.add(139, 90_000_000)
+    assert count.line() == "99 % of 200 trials, 3 M steps/s, 0 s left"
+    count.add(1, 0)
+    assert count.line() == "100 % of 200 trials, 3 M steps/s, took 2 min"
 
 
-@pytest.mark.parametrize("chunk", [1, 3, 7, 25, 100])
-def test_no_tenth_is_told_twice(
-    clock: list[float], capsys: pytest.CaptureFixture[str], chunk: int
-) -> None:
-    """Trials that finish in chunks pass tenths by; the last line is always 100 %."""
-    with TrialBar(100, shown=False, lines=True) as bar:
-        for at in range(0, 100, chunk):
-            bar.update(min(chunk, 100 - at), 1)
-    tenths = [int(line.split()[0]) for line in capsys.readouterr().err.splitlines()]
-    assert tenths == sorted(set(tenths))
-    assert tenths[-1] == 100
-    assert all(tenth % 10 == 0 for tenth in tenths)
-
-
-def test_a_clock_that_stands_still_is_no_fault(
-    clock: list[float], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_clock_that_stands_still_is_no_fault(clock: list[float]) -> None:
     """Trials that take no time at all are told."""
-    with TrialBar(1, shown=False, lines=True) as bar:
-        bar.update(1, 5)
-    assert "100 % of 1 trials" in capsys.readouterr().err
-
-
-def test_a_bar_shows_rate_and_time_left(capsys: pytest.CaptureFixture[str]) -> None:
-    """A terminal has a bar that is drawn again, and none is left at the end."""
-    with TrialBar(4, shown=True) as bar:
-        bar._bar.mininterval = 0.0
-        for _ in range(3):
-            bar.update(1, 2_000_000)
-    shown = capsys.readouterr().err
-    assert re.search(r"3/4 \[\d\d:\d\d<\d\d:\d\d, .*M steps/s\]", shown)
-    assert shown.endswith("\r")
-    assert "\n" not in shown
+    count = Count(1)
+    count.add(1, 5)
+    assert count.line().startswith("100 % of 1 trials, ")
 
 
 def test_nothing_is_drawn_unless_it_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
@@ -82,8 +57,10 @@ def test_nothing_is_drawn_unless_it_is_asked_for(capsys: pytest.CaptureFixture[s
             report(1, 1)
     assert capsys.readouterr().err == ""
     with trial_meter(2, True) as report:
-        report(2, 1)
-    assert "/2 [" in capsys.readouterr().err
+        report(1, 1)
+    shown = capsys.readouterr().err
+    assert "computing" in shown
+    assert shown.endswith("\r")
 
 
 def report(file: Path, *numbers: int) -> None:
@@ -91,19 +68,68 @@ def report(file: Path, *numbers: int) -> None:
     file.write_text(json.dumps(numbers))
 
 
-def test_display_has_a_bar_of_notebooks_and_one_of_trials(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The bar of notebooks names the one that runs; that of trials stands below it."""
-    with Display(2, bars=True) as display:
-        display.begin("open_maze")
-        report(tmp_path / "events", 1, 8, 8, 10)
-        display.poll(tmp_path / "events")
+# --- on a terminal ---------------------------------------------------------------------------
+
+FAKE_RUN = """
+import json, time
+from pathlib import Path
+import click
+from replication.cli import _say
+from replication.progress import Display
+_say("before: fresh, nothing to do")
+with Display(2, bars=True) as display:
+    for name in ("open_maze", "obstacle_maze"):
+        display.begin(name)
+        _say(f"{name}: running, {'a long list of parameters, ' * 4}")
+        time.sleep(0.15)
+        display.poll(Path("events"))
+        for trials in range(0, 9, 2):
+            Path("events").write_text(json.dumps([hash(name), 8, trials, 10**6 * trials]))
+            display.poll(Path("events"))
+            time.sleep(0.12)
+        _say(f"{name}: 34 outputs in 1.0 s")
         display.end()
-    shown = capsys.readouterr().err
-    assert "open_maze" in shown
-    assert "/8 [" in shown
-    assert "/2 [" in shown
+_say("outputs (34 new): figures")
+"""
+
+
+@pytest.mark.parametrize("columns", [80, 110])
+def test_lines_and_the_bar_do_not_meet(tmp_path: Path, columns: int) -> None:
+    """Whenever the run is looked at, a bar has one line of its own, below all other lines."""
+    told = in_terminal("-c", FAKE_RUN, columns=columns, cwd=tmp_path)
+    ends = [found.start() for found in re.finditer("\r", told)] + [len(told)]
+    bars = set()
+    for end in ends:
+        *lines, last = [line for line in screen(told[:end], columns) if line.strip()] or [""]
+        for line in lines:
+            assert not re.search(r"trials,|\d\d:\d\d|\(\d of 2\)", line)
+        if "of 2)" in last:
+            assert re.match(r"o[a-z_]+ \([12] of 2\): (\d\d:\d\d|[ \d]+ %\|.+trials, .+)$", last)
+            assert len(last) <= columns
+            bars.add(last)
+    assert any("(1 of 2): 00:00" in bar for bar in bars)
+    assert any(re.search(r"\(2 of 2\):  50 %\|.*4 of 8 trials, .*left", bar) for bar in bars)
+    shown = "".join(line.ljust(columns) for line in screen(told, columns))
+    for name in ("open_maze", "obstacle_maze"):
+        assert shown.count(f"{name}: running, ") == shown.count(f"{name}: 34 outputs") == 1
+    assert "trials," not in shown
+    assert shown.rstrip().endswith("outputs (34 new): figures")
+
+
+def test_iterations_have_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A terminal shows the newest weight update, and nothing stays; elsewhere nothing is shown."""
+    code = (
+        "import time\nfrom replication.progress import iteration_meter\n"
+        "with iteration_meter() as report:\n"
+        "    for k in (1, 2, 3):\n        time.sleep(0.12)\n        report(k, k / 7)\n"
+    )
+    told = in_terminal("-c", code, columns=80, cwd=tmp_path)
+    assert "iteration 2, d = 0.2857" in told
+    assert "\n" not in told
+    assert not "".join(screen(told, 80)).strip()
+    with iteration_meter() as report:
+        report(1, 0.5)
+    assert capsys.readouterr() == ("", "")
 
 
 def test_display_in_a_log_writes_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -117,7 +143,7 @@ def test_display_in_a_log_writes_lines(tmp_path: Path, capsys: pytest.CaptureFix
     told = capsys.readouterr().err
     assert "\r" not in told
     assert [line.split(",")[0] for line in told.splitlines()] == [
-        f"  {10 * k:3d} % of {total} trials" for total in (10, 20) for k in range(1, 11)
+        f"  {10 * k} % of {total} trials" for total in (10, 20) for k in range(1, 11)
     ]
 
 
@@ -199,3 +225,17 @@ def test_a_log_that_is_closed_is_no_fault(tmp_path: Path, monkeypatch: pytest.Mo
     report(tmp_path / "events", 1, 2, 2, 5)
     with Display(1, bars=False) as display:
         display.poll(tmp_path / "events")
+
+
+def test_a_cell_shows_a_line(tmp_path: Path) -> None:
+    """In a notebook that is run by hand, one output tells how far the trials are."""
+    code = (
+        "from replication.progress import trial_meter\n"
+        "with trial_meter(4) as report:\n"
+        "    for _ in range(4): report(1, 1)"
+    )
+    node = write_notebook(tmp_path / "toy.ipynb", code)
+    client = NotebookClient(node, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+    (output,) = client.execute().cells[-1].outputs
+    assert output.output_type == "display_data"
+    assert output.data["text/plain"].startswith("100 % of 4 trials, ")

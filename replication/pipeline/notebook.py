@@ -1,7 +1,7 @@
 """Notebooks as files: one cell tagged `parameters`, code and text, and what they declare.
 
-The parameters cell holds literals only; `out`, the folder that the notebook writes to, is one of
-them.
+The parameters cell holds literals only, each perhaps with its type; `out`, the folder that the
+notebook writes to, is one of them.
 """
 
 from __future__ import annotations
@@ -213,11 +213,8 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
         text = source.splitlines()[statement.lineno - 1].strip()
         place = f"line {statement.lineno} of the parameters cell, `{text}`"
         try:
-            match statement:
-                case ast.Assign(targets=[ast.Name(id=name)], value=node):
-                    value = ast.literal_eval(node)
-                case _:
-                    raise ValueError(text)
+            name, node = assignment(statement)
+            value = ast.literal_eval(node)
         except (TypeError, ValueError, RecursionError, MemoryError):
             only = "only `name = literal` is allowed here; move other code to the next cell"
             refuse(path, f"{place}: {only}")
@@ -228,6 +225,16 @@ def _literals(path: Path, source: str) -> dict[str, Any]:
             refuse(path, f"{place}: {name!r} is there twice")
         literals[name] = value
     return literals
+
+
+def assignment(statement: ast.stmt) -> tuple[str, ast.expr]:
+    """Return the name and the value of `name = value` or `name: type = value`."""
+    match statement:
+        case ast.Assign(targets=[ast.Name(id=name)], value=value):
+            return name, value
+        case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value):
+            return name, value
+    raise ValueError("it is no assignment of one value to one name")
 
 
 def _is_json(value: Any) -> bool:

@@ -14,6 +14,9 @@ from replication.files import read_text
 from replication.pipeline.inputs import NEUTRAL
 from replication.pipeline.notebook import INJECTED, Notebook
 
+GIVEN = "# Parameters of this run, instead of those above"
+"""The first line of the cell in which papermill has put the parameters of a run."""
+
 ERROR = "papermill-error-cell-tag"
 """The tag of cells in which papermill points to an error."""
 
@@ -44,7 +47,7 @@ def clean(notebook: Notebook, node: Any) -> Any:
         cell.metadata.pop("papermill", None)
         _drop_empty_tags(cell)
         if INJECTED in _tags(cell):
-            lines = cell.source.split("\n")
+            lines = [GIVEN, *cell.source.split("\n")[1:]]
             cell.source = "\n".join(_as_declared(notebook, line) for line in lines)
     return node
 

@@ -154,7 +154,8 @@ def run_notebooks(
                 due.add(run.name)
         _check([run for run in runs if run.name in due], checks or {}, scheduler)
         published = []
-        with Display(len(due), bars=sys.stderr.isatty()) as display:
+        bars = sys.stderr.isatty() and sys.stdout.isatty()  # not behind `| tee`
+        with Display(len(due), bars=bars) as display:
             for run in map(Run.again, runs):
                 if not is_due(run):
                     echo(f"{run.name}: fresh, nothing to do")

@@ -12,6 +12,7 @@ from replication.pipeline.folders import exclusive, is_published
 from replication.pipeline.manifest import (
     FRESH,
     MISSING,
+    State,
     damaged,
     published_folders,
     read_manifest,
@@ -21,33 +22,30 @@ from replication.pipeline.notebook import refuse
 from replication.pipeline.plan import Run
 
 
-def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) -> list[str]:
-    """Return the state of every figure and table, notebook by notebook, a line each.
+def status_lines(
+    runs: Sequence[Run], out: Path, options: Sequence[str] = (), *, all: bool = False
+) -> list[str]:
+    """Return what is not up to date and why, and what to do; one line when all is well.
 
     `runs` are all notebooks as they are now, `out` holds their folders. The commands that are
-    recommended have the `options` that choose these outputs.
+    recommended have the `options` that choose these outputs. With `all`, every notebook and each
+    of its figures and tables has a line.
     """
     recorded = read_runs(out)
     lines, due, edited = [], [], False
     for run in runs:
         state, last = run.state, recorded.get(run.name)
-        when = f" ({last['seconds']:.0f} s, {_age(last['finished'])})" if last else ""
-        lines.append(f"{run.name}: {state.kind}{when}")
-        lines += [f"    because {reason}" for reason in _shortened(state.why)]
         if state.kind != FRESH:
             due.append(run.name)
             edited |= is_published(out) and bool(run.edits)
-        manifest = read_manifest(run.folder)
-        lost = damaged(run.folder, manifest) if manifest else {}
-        for stem, names in _by_stem(run.notebook.declared.outputs).items():
-            states = {lost.get(name, state.kind) for name in names}
-            text = ", ".join(sorted(states - {state.kind})) or state.kind
-            if not any((run.folder / name).exists() for name in names):
-                text = MISSING
-            suffixes = " ".join(name.removeprefix(stem) for name in names)
-            lines.append(f"    {text:<9}{stem} {suffixes}")
+        if all or state.kind != FRESH:
+            when = f" ({last['seconds']:.0f} s, {_age(last['finished'])})" if last else ""
+            lines.append(f"{run.name}: {state.kind}{when}")
+            lines += [f"    because {reason}" for reason in _shortened(state.why)]
+        lines += _output_lines(run, state) if all else []
     left = gone(runs, out)
-    lines += [*(f"{name}: its notebook is gone" for name in left), ""]
+    lines += [f"{name}: its notebook is gone" for name in left]
+    lines += [""] if lines else []
     if due:
         words = ["--publish"] if edited else []
         lines.append(f"to bring {out.name} up to date: {_command('run', *due, *options, *words)}")
@@ -55,6 +53,21 @@ def status_lines(runs: Sequence[Run], out: Path, options: Sequence[str] = ()) ->
         lines.append(f"everything is fresh; {_command('verify', *options)} proves it")
     if left:
         lines.append(f"to remove what is left of {', '.join(left)}: {_command('clean', *options)}")
+    return lines
+
+
+def _output_lines(run: Run, state: State) -> list[str]:
+    """Return the state of each figure and table of a notebook."""
+    manifest = read_manifest(run.folder)
+    lost = damaged(run.folder, manifest) if manifest else {}
+    lines = []
+    for stem, names in _by_stem(run.notebook.declared.outputs).items():
+        states = {lost.get(name, state.kind) for name in names}
+        text = ", ".join(sorted(states - {state.kind})) or state.kind
+        if not any((run.folder / name).exists() for name in names):
+            text = MISSING
+        suffixes = " ".join(name.removeprefix(stem) for name in names)
+        lines.append(f"    {text:<9}{stem} {suffixes}")
     return lines
 
 

@@ -239,17 +239,13 @@ def readable_predictions(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-TERMINAL = 100
-"""Columns that a line for a terminal may have."""
-
-
-def verdict_lines(table: pd.DataFrame) -> list[str]:
-    """Return judged claims for a terminal: what each says, and its verdicts in one sentence."""
+def verdict_lines(table: pd.DataFrame, terminal: int = 100) -> list[str]:
+    """Return judged claims for a terminal of some width: what each says, and its verdicts."""
     names = [LABELS.get(id, id) for id in table["id"].unique()]
     width = max(map(len, names)) + 2
     lines = []
     for name, (_, part) in zip(names, table.groupby("id", sort=False), strict=True):
-        first, *rest = textwrap.wrap(sentence(part), TERMINAL - width)
+        first, *rest = textwrap.wrap(sentence(part), max(terminal - width, 20))
         lines += [name.ljust(width) + first, *(" " * width + line for line in rest)]
     return lines
 

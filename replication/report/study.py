@@ -10,9 +10,10 @@ import pandas as pd
 from IPython.display import Markdown
 
 from replication.demos.files import load_demos
+from replication.errors import UserError, show
 from replication.evidence import experiments, tables
 from replication.evidence.experiments import EXPERIMENTS, Key
-from replication.files import resolve
+from replication.files import parse_json, resolve
 from replication.irl import Trial
 from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
 from replication.report.outputs import Outputs
@@ -34,7 +35,8 @@ class Study(Outputs):
     demos
         File of demonstrations. If they are of another task, nothing is published to compare with.
     choices
-        Registered choices that differ from the experiment's.
+        Registered choices that differ from the experiment's; also as JSON text, which is what
+        `papermill -p` makes of them.
     seed, jobs
         Root seed, and number of worker processes.
     store, out
@@ -54,7 +56,7 @@ class Study(Outputs):
         self,
         experiment: str,
         demos: str,
-        choices: Mapping[str, Any],
+        choices: Mapping[str, Any] | str,
         *,
         seed: int,
         jobs: int,
@@ -69,7 +71,7 @@ class Study(Outputs):
         super().__init__(resolve(out))
         design = EXPERIMENTS[experiment]
         self.demos = load_demos(resolve(demos))
-        self.choices = {**design.choices, **choices}
+        self.choices = {**design.choices, **_given(choices)}
         self.report = Report(**report)
         self.number, self.set_number, self.path = trials, set_trials, path
         self.settings: dict[str, Any] = {"store": Store(resolve(store)), "jobs": jobs, "seed": seed}
@@ -128,3 +130,14 @@ class Study(Outputs):
     def show(self, table: pd.DataFrame) -> Markdown:
         """Show a table that is not written."""
         return Markdown(markdown(table))
+
+
+def _given(choices: Mapping[str, Any] | str) -> dict[str, Any]:
+    """Return choices; refuse what names none."""
+    try:
+        given = parse_json(choices) if isinstance(choices, str) else choices
+    except ValueError:
+        given = None
+    if not isinstance(given, Mapping):
+        raise UserError(f'choices = {show(choices)} is no JSON object such as {{"alpha": 0.1}}')
+    return dict(given)

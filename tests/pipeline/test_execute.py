@@ -105,6 +105,7 @@ def test_executed_notebook_has_no_path_of_the_machine(run: Run, project: Path) -
     assert outputs["stderr"].text == "build/quick/toy True\n"
     assert outputs["stdout"].text == "0\n1\n2\n3\n"
     assert "PosixPath('build/quick/toy/a.txt')" in outputs["result"].data["text/plain"]
+    assert shown[2].source.startswith("# Parameters of this run, instead of those above\n")
     assert 'out = "build/quick/toy"' in shown[2].source
     assert "mine" not in content
 

@@ -38,6 +38,7 @@ def write(tmp_path: Path) -> Write:
         ('out = "x"\na = b = 1', "line 2 of the parameters cell, `a = b = 1`"),
         ('out = "x"\na, b = 1, 2', "line 2 of the parameters cell"),
         ('out = "x"\na = 1\na = 2', "line 3 of the parameters cell, `a = 2`: 'a' is there twice"),
+        ('out = "x"\nn: int', "line 2 of the parameters cell, `n: int`: only `name = literal`"),
         ('out = "x"\npair = (1, 2)', "a parameter must be a JSON value"),
         ('out = "x"\nhuge = 1e999', "a parameter must be a JSON value"),
         ('out = "x"\n%matplotlib', "line 2 of the parameters cell is not Python"),
@@ -53,8 +54,10 @@ def test_parameters_cell_holds_json_literals_only(
 
 
 def test_literals_are_read_with_comments_and_signs(write: Write) -> None:
-    """Comments, negative numbers, null and nested values may stand in the parameters cell."""
-    source = 'out = "x"  # a folder\n# more\nn = -2\nnone = None\nsets = {"a": [1, {"b": True}]}'
+    """Types, comments, negative numbers, null and nested values may stand in the cell."""
+    source = (
+        'out: str = "x"  # a folder\n# more\nn = -2\nnone = None\nsets = {"a": [1, {"b": True}]}'
+    )
     expected = {"out": "x", "n": -2, "none": None, "sets": {"a": [1, {"b": True}]}}
     assert read_notebook(write(parameters=source)).literals == expected
 

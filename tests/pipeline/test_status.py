@@ -46,9 +46,10 @@ def prepared(project: Path, *names: str) -> list[Run]:
     return prepare(paths, profile="paper", out=project / "figures")
 
 
-def lines(project: Path, *names: str) -> list[str]:
+def lines(project: Path, *names: str, all: bool = True) -> list[str]:
     """Return the status of notebooks, as if their runs had taken no time."""
-    lines = status_lines(prepared(project, *names or ("maze",)), project / "figures")
+    runs = prepared(project, *names or ("maze",))
+    lines = status_lines(runs, project / "figures", all=all)
     return [re.sub(r"\(\d+ s,", "(0 s,", line) for line in lines]
 
 
@@ -88,6 +89,22 @@ def test_what_is_stale_has_its_reasons(project: Path) -> None:
     ]
     assert [line.split()[0] for line in found[3:6]] == ["stale"] * 3
     assert found[-1] == "to bring figures up to date: replicate run maze --publish"
+
+
+def test_only_what_is_due_is_told(project: Path) -> None:
+    """When all is well there is one line; otherwise what is due has its reasons, and no list."""
+    write(project)
+    write(project, "open")
+    run(project, "maze", "open")
+    fresh = ["everything is fresh; replicate verify proves it"]
+    assert lines(project, "maze", "open", all=False) == fresh
+    (project / "figures" / "open" / "fig.png").write_text("mine")
+    assert lines(project, "maze", "open", all=False) == [
+        "open: stale (0 s, just now)",
+        "    because fig.png is changed",
+        "",
+        "to bring figures up to date: replicate run open",
+    ]
 
 
 def test_damaged_outputs_are_told_apart(project: Path) -> None:

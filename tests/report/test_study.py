@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from replication import Demos, save_demos
+from replication.errors import UserError
 from replication.evidence.experiments import GENERAL, NAMED, NONE, Key
 from replication.evidence.tables import sets_table
 from replication.paper.published import FIGURE_5, TABLE_1
@@ -20,7 +22,8 @@ def make(folder: Path, demos: str, experiment: str = "open-maze", **changed: obj
     """Make a study of very few trials."""
     given: dict[str, Any] = {"trials": 3, "sets": ("opposite", NAMED), "set_trials": 2, **changed}
     place: dict[str, Any] = {"store": str(folder / "trials.sqlite"), "out": str(folder / "out")}
-    return Study(experiment, demos, FEW, seed=4, jobs=1, **place, **given)
+    given = {"choices": FEW} | given
+    return Study(experiment, demos, seed=4, jobs=1, **place, **given)
 
 
 @pytest.fixture
@@ -121,3 +124,12 @@ def test_a_report_is_checked(small_demos: Demos, tmp_path: Path) -> None:
 def test_tables_are_shown_as_markdown(study: Study) -> None:
     """A table that is only shown is Markdown with its columns as the head."""
     assert study.show(study.main.head(1)).data.startswith("| task  | method")
+
+
+@pytest.mark.parametrize("text", ['{"alpha": 0.1', "alpha", '["alpha"]', "3", "[" * 500])
+def test_choices_may_be_json_text(own: str, tmp_path: Path, text: str) -> None:
+    """What papermill passes on counts like the object that it says; no other text does."""
+    study = make(tmp_path, own, choices=json.dumps(FEW | {"alpha": 0.1}))
+    assert study.choices == study.choices | FEW | {"alpha": 0.1}
+    with pytest.raises(UserError, match=r"^choices = [^\n]* is no JSON object such as [^\n]*$"):
+        make(tmp_path, own, choices=text)
