@@ -110,6 +110,10 @@ PARTS = ("screen", "final")
 """The stages, as the column `part` of the table of trials names them."""
 
 
+JUDGED = "judged"
+"""What stands for the judging run there."""
+
+
 def stages(
     *, screen_trials: int = SCREEN_TRIALS, final_trials: int = FINAL_TRIALS
 ) -> list[tuple[int, Callable[[pd.DataFrame], list[Group]]]]:
@@ -165,6 +169,13 @@ def calibration_table(trials: pd.DataFrame, stage: str) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows).sort_values("kl_divergence", kind="stable", ignore_index=True)
+
+
+def judged_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return the same for the judging run: one row a trace, given the open maze's trials."""
+    own = trials[(trials["method"] == "unified") & trials["reading"].isin(TRACES)]
+    number = own["reading"].map({trace: points().index(chosen(trace)) for trace in TRACES})
+    return calibration_table(own.assign(part=JUDGED, number=number), JUDGED)
 
 
 def worlds(table: pd.DataFrame) -> pd.Series:

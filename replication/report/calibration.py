@@ -2,58 +2,89 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from replication.evidence.calibration import TRACE, WORLD
+from replication.evidence.calibration import JUDGED, TRACE, WORLD
 from replication.irl.methods import TRACES
-from replication.report.drawing import handle
+from replication.report.drawing import BLUE, INK, VERMILION, handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, Form, interval, readable
 from replication.report.style import canvas, legend_below, settled
 
+RATES = {0.1: "#A6A6A6", 0.3: "#56B4E9", 0.5: BLUE, 0.9: "#111111"}
+STARTS = {0.1: "o", 0.5: "s", 1.0: "D"}
+"""The colour of each rate of the trace, and the mark of each start."""
 
-def points(table: pd.DataFrame) -> Picture:
-    """Show the SD against the mean of each finalist, with intervals, a panel for each trace.
 
-    `table` is a :func:`~replication.evidence.calibration.calibration_table`.
+def points(final: pd.DataFrame, judged: pd.DataFrame) -> Picture:
+    """Show the SD against the mean of each finalist and of the judging run, with intervals.
+
+    Both tables are those of :func:`~replication.evidence.calibration.calibration_table`; there is a
+    panel for each trace.
     """
     parts = [
         f"{F_LABELS[trace]}: {len(rows)} finalists, {int(rows['fits'].sum())} of which fit; the "
-        f"nearest has a mean of {rows['mean'].iloc[0]:.1f} (SD {rows['sd'].iloc[0]:.1f})"
-        for trace, rows in table.groupby("F-INDEX", sort=False)
+        f"nearest has a mean of {rows['mean'].iloc[0]:.1f} (SD {rows['sd'].iloc[0]:.1f}), and the "
+        f"judging run {_pair(judged[judged['F-INDEX'] == trace])}"
+        for trace, rows in final.groupby("F-INDEX", sort=False)
     ]
-    paper = table.iloc[0]
+    paper = final.iloc[0]
     words = f"Published are {paper['paper_mean']:.2f} ({paper['paper_sd']:.2f})"
+    table = pd.concat([final.assign(run="final"), judged.assign(run=JUDGED)], ignore_index=True)
     return Picture(table, draw_points, f"{words}. {'; '.join(parts)}.")
+
+
+def _pair(rows: pd.DataFrame) -> str:
+    return "; ".join(f"{row.mean:.1f} (SD {row.sd:.1f})" for row in rows.itertuples(index=False))
 
 
 @settled
 def draw_points(numbers: pd.DataFrame) -> Figure:
-    """Draw the finalists, those that fit filled, the defaults ringed, and the published pair."""
-    traces = [trace for trace in TRACES if trace in set(numbers["F-INDEX"])]
-    figure, axes = canvas(1, len(traces), height=3.4, sharex=True, sharey=True)
-    for panel, trace in zip(axes, traces, strict=True):
-        for row in numbers[numbers["F-INDEX"] == trace].itertuples():
-            colour = "#0072B2" if row.fits else "0.55"
-            panel.hlines(row.sd, row.low, row.high, color=colour, lw=0.9, alpha=0.6)
-            panel.vlines(row.mean, row.sd_low, row.sd_high, color=colour, lw=0.9, alpha=0.6)
-            panel.plot(row.mean, row.sd, "o", ms=5, color=colour, mfc=colour if row.fits else "w")
-            if row.default:
-                panel.plot(row.mean, row.sd, "o", ms=11, mfc="none", mec="0.1", mew=1.2)
+    """Draw the finalists, those that fit filled, the judging run, and the published pair."""
+    numbers = numbers.rename(columns={"F-INDEX": "trace", "ALPHA": "alpha", "F-START": "start"})
+    traces = [trace for trace in TRACES if trace in set(numbers["trace"])]
+    figure, axes = canvas(1, len(traces), height=3.9, sharex=True, sharey=True)
+    judged = numbers["run"] == JUDGED
+    for letter, panel, trace in zip("ab", axes, traces, strict=False):
+        own = numbers["trace"] == trace
+        for row in numbers[own & ~judged].itertuples():
+            colour, mark = RATES[row.alpha], STARTS[row.start]
+            _cross(panel, row, colour, lw=0.9, alpha=0.5)
+            face = colour if row.fits else "w"
+            panel.plot(row.mean, row.sd, mark, ms=4.5, mec=colour, mfc=face, mew=1.2)
+        for row in numbers[own & judged].itertuples():
+            _cross(panel, row, VERMILION, lw=1.8, zorder=4)
+            panel.plot(row.mean, row.sd, "o", ms=4.5, color=VERMILION, zorder=5)
         mean, sd = numbers[["paper_mean", "paper_sd"]].iloc[0]
-        panel.plot(mean, sd, "*", ms=14, mfc="none", mec="#D0021B", mew=1.3, zorder=5)
-        panel.set(title=F_LABELS[trace], xlabel="mean of the iterations")
+        panel.plot(mean, sd, "*", ms=14, mfc="none", mec=INK, mew=1.3, zorder=6)
+        panel.set_title(f"({letter}) {F_LABELS[trace]}", loc="left")
+        panel.set_xlabel("mean of the iterations")
     axes[0].set_ylabel("SD of the iterations")
-    handles = [handle("does not fit, with 95 % intervals", "o", "0.55", mfc="white", lw=0.9)]
-    if numbers["fits"].any():
-        handles.append(handle("fits", "o", "#0072B2", lw=0.9))
-    if numbers["default"].any():
-        handles.append(handle("default", "o", "0.1", ms=9, mfc="none", lw=0))
-    star = f"published ({mean:.2f}, {sd:.2f})"
-    handles.append(handle(star, "*", "#D0021B", ms=10, mfc="none", lw=0))
-    legend_below(figure, handles)
+    legend_below(figure, _handles(numbers[~judged], numbers[judged], mean, sd))
     return figure
+
+
+def _cross(panel: Axes, row: Any, colour: str, **style: Any) -> None:
+    """Draw both intervals of a point."""
+    panel.hlines(row.sd, row.low, row.high, color=colour, **style)
+    panel.vlines(row.mean, row.sd_low, row.sd_high, color=colour, **style)
+
+
+def _handles(final: pd.DataFrame, judged: pd.DataFrame, mean: float, sd: float) -> list[Artist]:
+    rates = [handle(f"α = {rate:g}", "", colour, lw=3) for rate, colour in RATES.items()]
+    starts = [handle(f"F₀ = {f:g}", mark, "0.3", mfc="w", lw=0) for f, mark in STARTS.items()]
+    rest = [handle("hollow: does not fit", "o", "0.3", mfc="w", lw=0)]
+    if len(judged):
+        rest.append(handle(f"judging run ({judged['n'].max()} trials)", "o", VERMILION, lw=1.8))
+    star = f"published ({mean:.2f}, {sd:.2f})"
+    rest.append(handle(star, "*", INK, ms=10, mfc="none", lw=0))
+    rest.append(handle(f"95 % intervals, {final['n'].max()} trials", "+", "0.5", ms=9, lw=0))
+    return [*rates, *starts, *rest]
 
 
 def _point_columns(table: pd.DataFrame) -> pd.DataFrame:

@@ -1,7 +1,9 @@
-"""What the figures of claims share: scales, marks, rows in blocks, legends, counts in words."""
+"""What the figures of claims share: colours, marks, units, scales, rows in blocks, legends."""
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Hashable, Sequence
 from typing import Any
 
@@ -10,36 +12,58 @@ import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
 from replication.evidence.sensitivity import HOLDS, OPEN, REVERSED
+from replication.report import choices
 from replication.report.readable import F_LABELS
 
-OUTCOMES = {HOLDS: "#0072B2", OPEN: "#9A9A9A", REVERSED: "#D55E00"}
+INK, GREY = "#222222", "#8A8A8A"
+BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+"""Of Okabe and Ito; blue speaks for a claim, vermilion against it."""
+
+OUTCOMES = {HOLDS: BLUE, OPEN: GREY, REVERSED: VERMILION}
 MARKS = {HOLDS: "o", OPEN: "s", REVERSED: "D"}
 READING_MARKS = {
-    "printed": ("o", "#222222"),
-    "updated": ("s", "#009E73"),
-    "at-once": ("D", "#CC79A7"),
-    "": ("o", "#222222"),
+    "printed": ("o", INK),
+    "updated": ("s", GREEN),
+    "at-once": ("D", PURPLE),
+    "": ("o", INK),
 }
-SMALL = 7.0
+TASKS = {"open-maze": "open maze", "obstacle-maze": "obstacles", "soccer": "soccer"}
+SMALL, LABELS = 7.0, -158
+DASHES: Any = (0, (4, 2))
 
 FAR = 8
-"""How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic."""
+"""How far beyond the upper quartile an effect has to lie for an axis that turns logarithmic.
+
+Effects of exactly zero do not count.
+"""
 
 UNITS = {
+    ("share", "converged"): "share of trials at zero",
     ("saved", "iterations"): "iterations saved",
     ("saved", "early_collisions"): "collisions spared",
     ("saved", "early_errors"): "erroneous motions spared",
     ("sd-ratio", "iterations"): "ratio of SDs",
     ("mean", "q_growth"): "growth of Q",
     ("mean", "reward_growth"): "growth of the reward",
-    ("share", "converged"): "share of trials at zero",
 }
 """The unit of a comparative claim's effect, by its statistic and its measure."""
+
+
+def statement(claim: str) -> str:
+    """Return what a claim says on any task.
+
+    Examples
+    --------
+    >>> statement("Incorrect demonstrations save iterations on the open maze")
+    'Incorrect demonstrations save iterations'
+    """
+    return re.sub(r",? (on the open maze|in the maze with obstacles|in robot soccer)$", "", claim)
 
 
 def number(value: float) -> str:
@@ -68,7 +92,7 @@ class Ratios(Locator):
 
 def scale(panel: Axes, name: str, statistic: str, effects: pd.Series) -> None:
     """Give an axis few ticks, ratios a logarithmic one, and far outliers one that they fit on."""
-    size = effects.abs().dropna()
+    size = effects[effects != 0].abs().dropna()
     axis: Any = getattr(panel, f"{name}axis")
     if statistic == "sd-ratio":
         getattr(panel, f"set_{name}scale")("log")
@@ -85,10 +109,22 @@ def scale(panel: Axes, name: str, statistic: str, effects: pd.Series) -> None:
         axis.set_major_locator(MaxNLocator(4 if name == "x" else 6, steps=[1, 2, 2.5, 5, 10]))
 
 
-def unit(panel: Axes, name: str, statistic: str, measure: str) -> tuple[str, str]:
-    """Return the unit of an axis, and what to add if its scale is symmetric logarithmic."""
-    symmetric = getattr(panel, f"get_{name}scale")() == "symlog"
-    return UNITS[statistic, measure], ", symmetric log axis" if symmetric else ""
+def unit(panel: Axes, name: str, statistic: str, measure: str) -> str:
+    """Return the unit of an axis, and where its scale is logarithmic."""
+    kind = getattr(panel, f"get_{name}scale")()
+    transform: Any = getattr(panel, f"{name}axis").get_transform()
+    where = {"log": ", log axis", "symlog": f", log beyond ±{getattr(transform, 'linthresh', 0):g}"}
+    return UNITS[statistic, measure] + where.get(kind, "")
+
+
+def limit(panel: Axes, values: NDArray[np.float64]) -> None:
+    """Give the x axis room for all values, so that something can be drawn up to its ends."""
+    log = panel.get_xscale() == "log"
+    used = values[np.isfinite(values) & ((values > 0) | (not log))]
+    used = np.log(used) if log else used
+    room = 0.03 * (used.max() - used.min()) or 0.05
+    ends = used.min() - room, used.max() + room
+    panel.set_xlim(*(np.exp(ends) if log else ends))
 
 
 def pad(figure: Figure, **pads: Any) -> None:
@@ -105,7 +141,7 @@ def blocks(ids: Sequence[Hashable]) -> NDArray[np.float64]:
 
 def beside(panel: Axes, text: str, x: float, y: float, points: float, **style: Any) -> None:
     """Write beside a row: so many points right of an end of the panel, x = 0 or 1."""
-    style |= {"textcoords": "offset points", "va": "center_baseline", "size": SMALL}
+    style = {"textcoords": "offset points", "va": "center_baseline", "size": SMALL, **style}
     panel.annotate(text, (x, y), (points, 0), xycoords=panel.get_yaxis_transform(), **style)
 
 
@@ -124,10 +160,16 @@ def label_blocks(
     named = set()
     for at, (id, value) in zip(y, rows, strict=True):
         if id not in named:
-            beside(panel, id, 0, at, -158)
+            beside(panel, choices.title(id), 0, at, LABELS)
         named.add(id)
         weight = "bold" if (id, value) in bold else "normal"
-        beside(panel, value, 0, at, -4, ha="right", weight=weight)
+        beside(panel, choices.value(id, value), 0, at, -4, ha="right", weight=weight)
+
+
+def note(figure: Figure, text: str) -> None:
+    """Write a note in small type between the panels and the legend."""
+    text = textwrap.fill(text, 130, break_long_words=False)
+    figure.legends[0].set_title(text, prop=FontProperties(size=SMALL))
 
 
 def handle(label: str, mark: str, colour: Any, **style: Any) -> Artist:

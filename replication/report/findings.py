@@ -27,25 +27,11 @@ from replication.evidence.sensitivity import (
 from replication.evidence.specifications import DEFAULT, named_choices
 from replication.irl import METHODS
 from replication.paper.register import load_choices
+from replication.report.choices import NAMES
 from replication.report.readable import F_LABELS, full_label
 
 MATTERS = 0.05
 """Share of the variance from which on a choice is named in words."""
-
-NAMES = {
-    "MAP": "the map",
-    "DEMO-SHAPE": "the shape of the correct demonstration",
-    "INCORRECT-KINDS": "the kind of the incorrect demonstrations",
-    "F-INDEX": "the reading of Eq. 9",
-    "ALPHA": "α",
-    "F-START": "F₀",
-    "Q-START": "whether Q is kept or reset in each iteration",
-    "TIES": "how ties are broken",
-    "TIE-TOLERANCE": "which values count as tied",
-    "W-START": "the first weights",
-    "ADABOOST-RULE": "the rule of AdaBoost-IRL",
-}
-"""The choices of the factorial, in words."""
 
 
 # --- below the verdicts --------------------------------------------------------------------------

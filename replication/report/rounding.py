@@ -7,19 +7,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from replication.irl import get_method
-from replication.report.drawing import handle
+from replication.report.choices import power
+from replication.report.drawing import BLUE, INK, TASKS, VERMILION, handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, full_label, interval, p_value, readable
 from replication.report.style import canvas, legend_below, settled
 
 MARKS: dict[str, tuple[str, str]] = {
-    "double": ("o", "#222222"),
-    "fused": ("s", "#0072B2"),
-    "single": ("D", "#D55E00"),
+    "double": ("o", INK),
+    "fused": ("s", BLUE),
+    "single": ("D", VERMILION),
 }
-TASKS = {"open-maze": "open maze", "obstacle-maze": "obstacles"}
 
 
 def tolerances(table: pd.DataFrame) -> Picture:
@@ -43,6 +44,7 @@ def draw_tolerances(numbers: pd.DataFrame) -> Figure:
     tasks = list(dict.fromkeys(numbers["task"]))
     figure, axes = canvas(len(tasks), len(keys), height=4.2, sharex=True, sharey=True)
     steps = sorted(numbers["tolerance"].unique())
+    letters = iter("abcdefghij")
     for line, task in zip(axes, tasks, strict=True):
         for panel, (method, reading) in zip(line, keys, strict=True):
             own = numbers[
@@ -59,13 +61,17 @@ def draw_tolerances(numbers: pd.DataFrame) -> Figure:
                 style: dict[str, Any] = {"color": colour, "lw": 1.1}
                 panel.vlines(x, rows["mean"] - half, rows["mean"] + half, **style)
                 panel.plot(x, rows["mean"], mark, ms=4, color=colour)
-            panel.set_title(f"{TASKS[task]}\n{_short_label(method, reading)}", size=8)
-            panel.set_xticks(range(len(steps)), [_power(step) for step in steps])
+            title = f"({next(letters)}) {TASKS[task]}\n{_short_label(method, reading)}"
+            panel.set_title(title, size=8, loc="left")
+            panel.set_xticks(range(len(steps)), [power(step) for step in steps])
     for line in axes:
-        line[0].set_ylabel("mean iterations\n(95 % interval)")
+        line[0].yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        line[0].set_ylabel("mean number of iterations", size=8)
     for panel in axes[-1]:
-        panel.set_xlabel("tolerance (relative)")
-    legend_below(figure, [handle(name, *mark) for name, mark in MARKS.items()])
+        panel.set_xlabel("relative tolerance of ties", size=8)
+    handles = [handle(f"{name} arithmetic", *mark) for name, mark in MARKS.items()]
+    handles.append(handle(f"95 % interval, {numbers['n'].max()} trials", "|", "0.4", lw=0, ms=9))
+    legend_below(figure, handles)
     return figure
 
 
@@ -73,10 +79,6 @@ def _short_label(method: str, reading: str) -> str:
     """Return a method's label for a narrow panel; all are without incorrect demonstrations."""
     label = get_method(method).label.partition(" (")[0].partition(",")[0]
     return f"{label}, {F_LABELS[reading]}" if reading else label
-
-
-def _power(value: float) -> str:
-    return "0" if value == 0 else f"$10^{{{round(np.log10(value))}}}$"
 
 
 def profile(table: pd.DataFrame) -> Picture:
@@ -97,15 +99,18 @@ def draw_profile(numbers: pd.DataFrame) -> Figure:
     """Draw the shares of Q-tables against the step of the path, a panel for each method."""
     keys = list(numbers.groupby(["method", "reading"], sort=False))
     figure, axes = canvas(1, len(keys), height=2.5, sharex=True, sharey=True)
-    for panel, ((method, reading), rows) in zip(axes, keys, strict=True):
+    for letter, panel, ((method, reading), rows) in zip("abc", axes, keys, strict=False):
         x, tied, rounded = (rows[name].to_numpy() for name in ("step", "tied", "rounded"))
-        panel.bar(x, 100 * rounded, width=0.9, color="#D55E00")
+        panel.bar(x, 100 * rounded, width=0.9, color=VERMILION)
         panel.bar(x, 100 * tied, width=0.9, bottom=100 * rounded, color="0.75")
-        panel.set_title(_short_label(method, reading), size=8)
-        panel.set_xlabel("step of the expert's path")
-    axes[0].set_ylabel("share of Q-tables (%)")
+        panel.set_title(f"({letter}) {_short_label(method, reading)}", size=8, loc="left")
+        panel.annotate(f"{rows['tables'].iloc[0]} Q-tables", (0.03, 0.9), xycoords="axes fraction")
+        panel.set_xlabel("step of the expert's path", size=8)
+        panel.set_xlim(-0.6, x[-1] + 0.6)
+    axes[0].set_ylabel("share of Q-tables (%)", size=8)
+    axes[0].yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     handles = [
-        handle("best two values differ by rounding alone", "s", "#D55E00", ms=6, lw=0),
+        handle("best two values differ by rounding alone", "s", VERMILION, ms=6, lw=0),
         handle("best two values are equal", "s", "0.75", ms=6, lw=0),
     ]
     legend_below(figure, handles)

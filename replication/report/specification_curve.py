@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from replication.evidence.claims import short_label
-from replication.evidence.sensitivity import HOLDS, LEVEL, UNDEFINED
+from replication.evidence.claims import load_claims
+from replication.evidence.sensitivity import HOLDS, LEVEL, UNDEFINED, epsilon_squared
 from replication.evidence.specifications import DEFAULT, default_of, named_choices, sort_key
-from replication.report import drawing
-from replication.report.drawing import OUTCOMES, SMALL, handle
+from replication.report import choices, drawing
+from replication.report.drawing import OUTCOMES, handle
 from replication.report.picture import Picture
 from replication.report.readable import p_is
 from replication.report.style import canvas, legend_below, settled
+
+MOST, LEAST = 5, 0.01
+"""How many choices are drawn at most, and the share of the variance that one has at least."""
 
 
 def curve(effects: pd.DataFrame, claim: str) -> Picture:
@@ -39,8 +43,7 @@ def curve(effects: pd.DataFrame, claim: str) -> Picture:
         words = f"{claim} has no effect in any of {len(factorial)} specifications"
     else:
         words = (
-            f"{claim} holds in {drawing.holding(drawn)}; it is {drawing.counted(drawn)}"
-            f"{_without_caps(drawn).replace(chr(10), '; ')}. Effects run from "
+            f"{claim}: {'; '.join(_counts(drawn))}. Effects run from "
             f"{drawn['effect'].min():.3g} to {drawn['effect'].max():.3g}"
         )
     for row in default.itertuples():
@@ -50,131 +53,127 @@ def curve(effects: pd.DataFrame, claim: str) -> Picture:
 
 @settled
 def draw_curve(numbers: pd.DataFrame) -> Figure:
-    """Draw a specification curve; where no specification has an effect, one without counts."""
+    """Draw a specification curve above the choices that matter most to it."""
     default = numbers[numbers["group"] == DEFAULT]
     factorial = numbers[numbers["group"] != DEFAULT]
     part = factorial[factorial["outcome"] != UNDEFINED].reset_index(drop=True)
-    choices = pd.DataFrame(map(named_choices, factorial["specification"]))
-    rows = [(id, value) for id in choices for value in sorted(set(choices[id]), key=sort_key)]
-    ids = [id for id, _ in rows]
-    y = drawing.blocks(ids)
-    heights = 2.25, 0.123 * (y[-1] + 1)
-    layout = {"sharex": "col", "sharey": "row", "height_ratios": heights, "width_ratios": (10, 1)}
-    figure, grid = canvas(2, 2, height=3.0 + heights[1], **layout)
+    variance = _variance(factorial)
+    ids = variance.index[: max((variance[:MOST] >= LEAST).sum(), 1)].tolist()
+    values = pd.DataFrame(map(named_choices, factorial["specification"]))
+    rows = [(id, value) for id in ids for value in sorted(set(values[id]), key=sort_key)]
+    y = drawing.blocks([id for id, _ in rows])
+    heights = 2.2, 0.135 * (y[-1] + 1)
+    layout = {"sharex": "col", "sharey": "row", "height_ratios": heights, "width_ratios": (9, 1)}
+    figure, grid = canvas(2, 2, height=2.0 + sum(heights), **layout)
     drawing.pad(figure, w_pad=0.03, h_pad=0.03, wspace=0.0, hspace=0.0)
     (top, corner), (matrix, shares) = grid
-    first = factorial.iloc[0]
-    _set_up(top, first, part)
-    _draw_effects(top, part)
+    claim = load_claims().by_id(factorial["claim"].iloc[0]).claim
+    title: dict[str, Any] = {"x": 0.004, "ha": "left", "size": 9, "weight": "bold"}
+    figure.suptitle(drawing.statement(claim), **title)
+    _draw_effects(top, factorial.iloc[0], part)
     corner.set_axis_off()
     for row in default.dropna(subset="effect").itertuples():
-        top.axhline(row.effect, color="0.1", lw=1, ls=(0, (4, 2)), zorder=5)
+        top.axhline(row.effect, color="0.1", lw=1, ls=drawing.DASHES, zorder=5)
         text = f"default\n{drawing.number(row.effect)}\n({row.n} trials)"
         corner.text(0, row.effect, text, size=7, va="center")
-    x, outcome = np.arange(len(part)), part["outcome"].to_numpy()
-    chosen = pd.DataFrame(map(named_choices, part["specification"]), columns=choices.columns)
-    for at, (id, value) in zip(y, rows, strict=True):
-        on = (chosen[id] == value).to_numpy()
-        if on.any():
-            colours = [OUTCOMES[name] for name in outcome[on]]
-            matrix.vlines(x[on], at - 0.4, at + 0.4, colors=colours, lw=0.9)
-            share = float((outcome[on] == HOLDS).mean())
-            shares.barh(at, share, height=0.8, color=OUTCOMES[HOLDS], alpha=0.35, lw=0)
-            shares.text(0.04, at, f"{share:.0%}", size=SMALL, va="center_baseline")
-    drawing.shade_blocks(matrix, ids, y)
+    _draw_choices(matrix, shares, part, rows, y)
     bold = [pair for name in default["specification"] for pair in named_choices(name).items()]
     drawing.label_blocks(matrix, rows, y, bold)
-    if len(part):
-        _write_counts(top, part)
-        shares.axvline((outcome == HOLDS).mean(), color=OUTCOMES[HOLDS], lw=0.8, ls=":")
-    shares.set(xlim=(0, 1), xticks=[], xlabel=HOLDS)
+    for id in ids:
+        second = y[[one for one, _ in rows].index(id) + 1]
+        share = f"{100 * max(variance[id], 0):.0f} % of the variance"
+        drawing.beside(matrix, share, 0, second, drawing.LABELS, color="0.35")
     lost = len(factorial) - len(part)
     more = f"; {lost} more have none" if lost else ""
-    matrix.set(xlabel=f"{len(part)} specifications, in the order of their effects{more}", xticks=[])
-    for panel in (matrix, shares):
-        panel.spines[:].set_visible(False)
-        panel.tick_params(left=False, labelleft=False)
-        panel.xaxis.label.set_size(7.5)
-    neutral = f"no effect ({drawing.number(first['neutral'])})"
+    text = f"{len(part)} specifications in the order of their effects{more}"
+    others = ", ".join(choices.title(id) for id in variance.index if id not in ids)
+    matrix.set_xlabel(text, size=7.5)
+    neutral = f"no effect ({drawing.number(factorial['neutral'].iloc[0])})"
     handles = drawing.outcome_handles("o", neutral, capped=bool((part["capped"] > 0).any()))
+    handles.append(handle("default (values in bold)", "", "0.1", lw=1, ls=drawing.DASHES))
+    handles.append(handle("holds, over all", "", OUTCOMES[HOLDS], lw=0.8, ls=":"))
     if part["null_low"].notna().any():
         handles.append(Patch(color="0.85", lw=0, label="95 % without any effect"))
-    handles.append(handle("holds, over all", "", OUTCOMES[HOLDS], lw=0.8, ls=":"))
     legend_below(figure, handles)
+    drawing.note(figure, f"Not drawn, as they matter less: {others}.")
     return figure
 
 
-def _set_up(panel: Axes, first: pd.Series, part: pd.DataFrame) -> None:
-    """Set up the panel of the effects, with the claim's name and what no effect is."""
+def _variance(factorial: pd.DataFrame) -> pd.Series:
+    """Return the share of the variance of each choice that can act, the largest first."""
+    claim, names = factorial[["claim", "specification"]].iloc[0]
+    ids = [id for id in named_choices(names) if choices.acts(id, claim)]
+    known = epsilon_squared(factorial).set_index("choice")["share"].reindex(ids).fillna(0.0)
+    return known.sort_values(ascending=False, kind="stable")
+
+
+def _draw_effects(panel: Axes, first: pd.Series, part: pd.DataFrame) -> None:
+    """Draw the curve with its null band, and say above it in how many specifications it holds."""
     drawing.scale(panel, "y", first["statistic"], part["effect"])
     panel.axhline(first["neutral"], color="0.25", lw=1, zorder=1)
     panel.set_xlim(-1.5, len(part) + 0.5)
-    name, symmetric = drawing.unit(panel, "y", first["statistic"], first["measure"])
-    panel.set_ylabel(f"{name}\n(95 % interval{symmetric})")
-    maps = ", on all maps" if "MAP" in named_choices(first["specification"]) else ""
-    panel.set_title(f"{short_label(first['claim'])}{maps} ({first['claim']})", loc="left")
+    name = drawing.unit(panel, "y", first["statistic"], first["measure"])
+    panel.set_ylabel(f"{textwrap.fill(name, 34)}\n(95 % interval)", size=8)
     panel.tick_params(axis="x", bottom=False)
-
-
-def _draw_effects(panel: Axes, part: pd.DataFrame) -> None:
+    if len(part):
+        place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
+        place |= {"size": 8, "linespacing": 1.4, "va": "bottom"}
+        panel.annotate("\n".join(_counts(part)), (0, 1), (drawing.LABELS, 5), **place)
     band = part[["null_low", "null_high"]].to_numpy(float).T
     panel.fill_between(part.index, *band, color="0.85", lw=0, zorder=0)
-    style: dict[str, Any] = {"ms": 2.6, "mew": 0.7, "zorder": 4}
     for outcome, colour in OUTCOMES.items():
         rows = part[part["outcome"] == outcome]
-        panel.vlines(rows.index, rows["low"], rows["high"], color=colour, lw=0.9, alpha=0.4)
+        panel.vlines(rows.index, rows["low"], rows["high"], color=colour, lw=0.9, alpha=0.35)
         for face, capped in ((colour, False), ("white", True)):
             some = rows[(rows["capped"] > 0) == capped]
-            panel.plot(some.index, some["effect"], "o", mec=colour, mfc=face, **style)
+            look: dict[str, Any] = {"mec": colour, "mfc": face, "ms": 2.8, "mew": 0.6}
+            panel.plot(some.index, some["effect"], "o", alpha=0.65, zorder=4, **look)
 
 
-def _write_counts(panel: Axes, part: pd.DataFrame) -> None:
-    """Write in how many specifications a claim holds, where there is room.
+def _draw_choices(
+    matrix: Axes,
+    shares: Axes,
+    part: pd.DataFrame,
+    rows: Sequence[tuple[str, str]],
+    y: NDArray[np.float64],
+) -> None:
+    """Draw which specifications have each value, and in which share of them the claim holds."""
+    outcome = part["outcome"].to_numpy()
+    names = [named_choices(name) for name in part["specification"]]
+    for at, (id, value) in zip(y, rows, strict=True):
+        on = np.array([name[id] == value for name in names], bool)
+        if on.any():
+            x, colours = np.flatnonzero(on), [OUTCOMES[name] for name in outcome[on]]
+            matrix.vlines(x, at - 0.4, at + 0.4, colors=colours, lw=0.9)
+            share = float((outcome[on] == HOLDS).mean())
+            shares.barh(at, share, height=0.7, color=OUTCOMES[HOLDS], alpha=0.5, lw=0)
+            drawing.beside(shares, f"{100 * share:.0f} %", 1, at, 28, ha="right")
+    drawing.shade_blocks(matrix, [id for id, _ in rows], y)
+    if len(part):
+        shares.axvline((outcome == HOLDS).mean(), color=OUTCOMES[HOLDS], lw=0.8, ls=":")
+    matrix.set_xticks([])
+    shares.set(xlim=(0, 1), xticks=[])
+    shares.set_xlabel(HOLDS, size=7.5)
+    for panel in (matrix, shares):
+        panel.spines[:].set_visible(False)
+        panel.tick_params(left=False, labelleft=False)
 
-    The curve rises: its upper left and lower right are free, one of them more than the other.
-    """
-    low, high, effect = _finite(panel, part[["low", "high", "effect"]].to_numpy(float))
-    third = max(len(part) * 2 // 5, 1)
-    above = np.nanmax(high) - np.nanmax(np.append(high[:third], effect[0]))
-    below = np.nanmin(np.append(low[-third:], effect[-1])) - np.nanmin(low)
-    (x, y), (ha, va) = (0.015, 0.97), ("left", "top")
-    if below > above:
-        (x, y), (ha, va) = (0.985, 0.04), ("right", "bottom")
-    text = f"holds in {drawing.holding(part)}\n{drawing.counted(part)}{_without_caps(part)}"
-    text += _jointly(part)
-    halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
-    place: dict[str, Any] = {"transform": panel.transAxes, "ha": ha, "va": va}
-    panel.text(x, y, text, size=8, linespacing=1.4, path_effects=halo, zorder=6, **place)
 
-
-def _jointly(part: pd.DataFrame) -> str:
-    """Say what the joint test of all specifications gives, if there is one."""
+def _counts(part: pd.DataFrame) -> list[str]:
+    """Say in how many specifications the claim holds, and what the joint test gives, if any."""
+    lines = [f"holds in {drawing.holding(part)}, {drawing.counted(part)}"]
+    uncapped = part[part["capped"] == 0]
+    if 0 < len(uncapped) < len(part):
+        holds = (uncapped["outcome"] == HOLDS).sum()
+        share = 100 * holds / len(uncapped)
+        lines.append(
+            f"without trials at the cap: holds in {holds} of {len(uncapped)} ({share:.0f} %)"
+        )
     first = part.iloc[0]
-    if np.isnan(first["p_median"]):
-        return ""
-    alone = int((part["p_family"] < LEVEL).sum())
-    return (
-        f"\njointly: median {p_is(first['p_median'])}, number {p_is(first['p_holds'])}"
-        f"\n{alone} beyond chance by themselves (family-wise)"
-    )
-
-
-def _finite(panel: Axes, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return columns as rows, on a linear scale."""
-    log = panel.get_yscale() == "log"
-    with np.errstate(divide="ignore"):
-        scaled: NDArray[np.float64] = (np.log(values) if log else values).T
-    return np.where(np.isfinite(scaled), scaled, np.nan)
-
-
-def _without_caps(part: pd.DataFrame) -> str:
-    """Say in how many specifications without a trial at the cap a claim holds, if others exist.
-
-    Nothing is said of shares: without such a trial they are 1.
-    """
-    some = part[part["capped"] == 0]
-    if part["statistic"].iloc[0] == "share" or len(some) in (0, len(part)):
-        return ""
-    holds = (some["outcome"] == HOLDS).sum()
-    share = 100 * holds / len(some)
-    return f"\nwithout trials at the cap: holds in {holds} of {len(some)} ({share:.0f} %)"
+    if not np.isnan(first["p_median"]):
+        alone = int((part["p_family"] < LEVEL).sum())
+        lines.append(
+            f"joint test: median {p_is(first['p_median'])}, number that hold "
+            f"{p_is(first['p_holds'])}; {alone} beyond chance by themselves"
+        )
+    return lines

@@ -38,6 +38,7 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.2,
     "svg.hashsalt": "replication",
     "svg.fonttype": "path",
+    "figure.dpi": 200,  # as saved: letters are as wide as their pixels make them
     "savefig.dpi": 200,
 }
 

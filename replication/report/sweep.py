@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
+from matplotlib.transforms import ScaledTranslation
 
+from replication.irl import READINGS
 from replication.report import drawing
 from replication.report.drawing import handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS
 from replication.report.style import canvas, legend_below, settled
+
+APART = 0.09
+"""Between the marks of two readings, in inches: those that agree do not hide one another."""
 
 
 def numbers(table: pd.DataFrame) -> Picture:
@@ -33,27 +39,37 @@ def numbers(table: pd.DataFrame) -> Picture:
 
 @settled
 def draw_numbers(numbers: pd.DataFrame) -> Figure:
-    """Draw the saving of each number of demonstrations, and the published one."""
-    figure, (panel,) = canvas(1, 1, height=3.4)
+    """Draw the saving of each number of demonstrations, and the published one.
+
+    The numbers of demonstrations stand above, the pairs of state and action that they mark below.
+    """
+    figure, (panel,) = canvas(1, 1, height=3.5)
     pairs = numbers.drop_duplicates("pairs").sort_values("pairs")
-    linear = float(pairs["pairs"][pairs["pairs"] > 0].min())
-    panel.set_xscale("symlog", linthresh=linear, linscale=0.3)
     panel.axhline(0, color="0.25", lw=1)
-    panel.axhline(numbers["paper"].iloc[0], color="0.3", lw=1, ls=(0, (4, 2)))
+    paper = numbers["paper"].iloc[0]
+    panel.axhline(paper, color="0.3", lw=1, ls=drawing.DASHES)
+    panel.annotate(f"the paper: {paper:.2f}", (0, paper), (0, 3), textcoords="offset points")
+    above = panel.twiny()
+    linear = float(pairs["pairs"][pairs["pairs"] > 0].min())
+    for axes, name in ((panel, "pairs"), (above, "number")):
+        axes.set_xscale("symlog", linthresh=linear, linscale=0.3)
+        axes.set_xlim(-0.3 * linear, 1.15 * pairs["pairs"].max())
+        axes.set_xticks(pairs["pairs"], pairs[name].astype(str), size=7.5)
+        axes.xaxis.set_minor_locator(NullLocator())
+    above.spines["top"].set_visible(True)
+    above.set_xlabel("incorrect demonstrations")
+    panel.set_xlabel("pairs of state and action that they mark (log axis)")
+    panel.set_ylabel("iterations saved, same seeds")
+    low, high = numbers["saved_low"].min(), max(numbers["saved_high"].max(), paper)
+    panel.set_ylim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     for reading, rows in numbers.groupby("reading", sort=False):
         mark, colour = drawing.READING_MARKS[str(reading)]
-        rows = rows.sort_values("pairs")
-        low, high = rows["saved_low"], rows["saved_high"]
-        panel.fill_between(rows["pairs"], low, high, color=colour, alpha=0.15, lw=0)
-        panel.plot(rows["pairs"], rows["saved"], color=colour, marker=mark, ms=4.5)
-    ticks = [f"{row.pairs}\n({row.number})" for row in pairs.itertuples()]
-    panel.set_xticks(pairs["pairs"], ticks)
-    panel.xaxis.set_minor_locator(NullLocator())
-    panel.tick_params(axis="x", labelsize=7.5)
-    panel.set(xlabel="marked pairs of state and action (incorrect demonstrations), log axis")
-    panel.set(ylabel="iterations saved, same seeds")
+        rows, shift = rows.sort_values("pairs"), APART * (list(READINGS).index(str(reading)) - 1)
+        beside = ScaledTranslation(shift, 0, figure.dpi_scale_trans)
+        style: dict[str, Any] = {"color": colour, "transform": panel.transData + beside}
+        panel.vlines(rows["pairs"], rows["saved_low"], rows["saved_high"], lw=1.4, **style)
+        panel.plot(rows["pairs"], rows["saved"], lw=0.8, marker=mark, ms=4.5, **style)
     handles = drawing.reading_handles(numbers)
-    handles.append(Patch(color="0.4", alpha=0.25, lw=0, label="95 % interval of the mean"))
-    handles.append(handle("the paper's saving", "", "0.3", lw=1, ls=(0, (4, 2))))
+    handles.append(handle("95 % interval of the mean", "|", "0.4", lw=0, ms=9))
     legend_below(figure, handles)
     return figure

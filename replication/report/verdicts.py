@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from replication.evidence.claims import label, load_claims
 from replication.evidence.experiments import NONE
@@ -21,22 +24,36 @@ from replication.evidence.verdicts import (
 )
 from replication.irl import READINGS
 from replication.report import drawing
-from replication.report.drawing import READING_MARKS, SMALL, UNITS, handle
+from replication.report.drawing import BLUE, INK, READING_MARKS, TASKS, UNITS, VERMILION, handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, SET_LABELS, sentence
 from replication.report.style import canvas, legend_below, settled
 
-COLOURS = {
-    SHOWN: "#0072B2",
-    ABSENT: "#B04A00",
-    REVERSED: "#AA3377",
-    INCONCLUSIVE: "#777777",
-    NOT_TESTABLE: "#777777",
+LOOKS: dict[str, dict[str, Any]] = {
+    SHOWN: {"ec": BLUE, "fc": BLUE, "ls": "-"},
+    ABSENT: {"ec": INK, "fc": "white", "ls": "-"},
+    REVERSED: {"ec": VERMILION, "fc": VERMILION, "ls": "-"},
+    INCONCLUSIVE: {"ec": "#777777", "fc": "white", "ls": (0, (2, 1.2))},
+    NOT_TESTABLE: {"ec": "#777777", "fc": "#E4E4E4", "ls": "-"},
 }
-"""A colour for each verdict; its word stands beside it."""
+"""Edge and face of a verdict's marks; its word stands beside them."""
 
-APART, CELL = 0.5, 0.103
-"""Space between two rows, in cells, and the height of a cell in inches."""
+SHARE, SPARED, GROWTH = (
+    "trials that reach zero (%)",
+    "spared, in % of those without incorrect demonstrations",
+    "growth from mid-term to end, of Q and of the reward",
+)
+"""What the axes of claims show whose effects are not drawn in the unit of their statistic."""
+
+TYPE = 8.5
+ROW, HEADING, HEAD, AXIS = 0.25, 1.05, 1.3, 0.33
+"""Height of a row in inches, of a heading and the columns' head in rows, of an axis in inches."""
+
+APART = 0.29
+"""Between two readings, in rows."""
+
+NAMES, NUMBERS, COLUMN, WORDS = -116, 26, 37, 124
+"""Where texts stand, in points from the left or right end of a panel."""
 
 
 def verdicts(table: pd.DataFrame) -> Picture:
@@ -51,101 +68,143 @@ def verdicts(table: pd.DataFrame) -> Picture:
 
 @settled
 def draw_verdicts(numbers: pd.DataFrame) -> Figure:
-    """Draw the comparative claims of a table of verdicts: a line for each cell, with its verdict.
+    """Draw the comparative claims of a table of verdicts: a row for each claim, task and set.
 
-    Where the margin is a share of what the second method needs, effects are drawn as shares of it,
-    so that tasks fit on one axis.
+    A row has a mark for each reading of Eq. 9 and, at the right, its effect and the verdict.
     """
-    table = _comparative(numbers)
-    units = [unit for unit in dict.fromkeys(UNITS.values()) if unit in set(table["unit"])]
-    parts = [table[table["unit"] == unit] for unit in units]
-    sizes = [_places(part)[-1] + 1 + APART for part in parts]
-    height = 0.55 + 0.38 * len(units) + CELL * sum(sizes)
-    figure, axes = canvas(len(units), 1, height=height, height_ratios=sizes)
-    for panel, unit, part in zip(axes, units, parts, strict=True):
-        relative = bool(part["fraction"].notna().all())
-        _draw_unit(panel, _relative(part) if relative else part)
-        symmetric = ", symmetric log axis" if panel.get_xscale() == "symlog" else ""
-        name = f"{unit} (%)" if relative else unit
-        panel.set_xlabel(f"{name}{symmetric}", size=7.5, labelpad=1)
-        panel.tick_params(axis="x", labelsize=7.5)
-    readings = [name for name in READINGS if name in set(table["reading"])]
-    handles = [handle(F_LABELS[name], READING_MARKS[name][0], "0.3", lw=1.3) for name in readings]
+    table = _scaled(_comparative(numbers))
+    parts = [part for _, part in table.groupby("axis", sort=False)]
+    tops = [0.6 + HEAD * (place == 0) for place in range(len(parts))]
+    heights = [ROW * (part["row"].max() + 0.6 + top) for part, top in zip(parts, tops, strict=True)]
+    whole = sum(heights) + AXIS * len(parts) + 0.62
+    figure, axes = canvas(len(parts), 1, height=whole, height_ratios=heights)
+    drawing.pad(figure, h_pad=0.03)
+    for panel, part, top in zip(axes, parts, tops, strict=True):
+        _draw(panel, part)
+        panel.set_ylim(part["row"].max() + 0.6, -top)
+    _head(axes[0], -tops[0])
+    used = [name for name in LOOKS if name in set(table["verdict"])]
+    handles: list[Artist] = [Patch(label=name, **LOOKS[name]) for name in used]
     handles += [
-        handle("the paper's effect", "|", "0.1", ms=9, mew=1.2, lw=0),
+        handle("95 % interval", "", INK, lw=1.5),
+        handle("the paper's effect", "|", INK, ms=9, mew=1.6, lw=0),
         Patch(color="0.9", lw=0, label="within the margin"),
+        handle(_trials(table), "", "none"),
     ]
     legend_below(figure, handles)
     return figure
 
 
+def _trials(table: pd.DataFrame) -> str:
+    """Say how many trials stand behind a cell."""
+    counts = table.groupby("n", sort=False)["task"].unique()
+    parts = (f"{n} ({', '.join(TASKS[task] for task in tasks)})" for n, tasks in counts.items())
+    return f"trials: {', '.join(parts)}"
+
+
 def _comparative(table: pd.DataFrame) -> pd.DataFrame:
-    units = [UNITS.get(key) for key in zip(table["statistic"], table["measure"], strict=True)]
+    known = [key in UNITS for key in zip(table["statistic"], table["measure"], strict=True)]
+    return table[known]
+
+
+def _scaled(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the cells in the order of the units, with their axis, heading and height on it.
+
+    Effects whose margin is a share of what the second method needs become per cents of that, so
+    that tasks and measures fit on one axis; a cell without numbers gets the margin of the others.
+    """
     fractions = {claim.id: claim.fraction for claim in load_claims().claim}
     fraction = table["id"].map(fractions).astype(float)
-    return table.assign(unit=units, fraction=fraction).dropna(subset="unit")
+    share = table["statistic"] == "share"
+    by = pd.Series(np.where(share, 100.0, 100 * fraction / table["margin"]), table.index)
+    by = by.where(share | fraction.notna(), 1.0)
+    columns = ["effect", "low", "high", "paper", "margin"]
+    table = table.assign(**table[columns].mul(by, axis=0))
+    table["margin"] = table["margin"].where(fraction.isna(), 100 * fraction)
+    units = [UNITS[key] for key in zip(table["statistic"], table["measure"], strict=True)]
+    axis = pd.Series(units, table.index).where(~share, SHARE).where(fraction.isna(), SPARED)
+    table["axis"] = axis.where(table["statistic"] != "mean", GROWTH)
+    table["heading"] = [drawing.statement(claim) for claim in table["claim"]]
+    order = {unit: place for place, unit in enumerate(UNITS.values())}
+    table = table.iloc[np.argsort([order[unit] for unit in units], kind="stable")]
+    table["heading"] = table["heading"].mask(table["heading"].duplicated(), "")
+    return pd.concat([_placed(part) for _, part in table.groupby("axis", sort=False)])
 
 
-def _relative(part: pd.DataFrame) -> pd.DataFrame:
-    """Return effects in per cent of what the second method needs, of which the margin is a share.
-
-    A cell without numbers gets the margin of the others.
-    """
-    scaled = part[["effect", "low", "high", "paper"]].mul(100 * part["fraction"], axis=0)
-    scaled = scaled.div(part["margin"], axis=0)
-    return part.assign(**scaled, margin=100 * part["fraction"])
-
-
-def _places(part: pd.DataFrame) -> NDArray[np.float64]:
-    """Return where the cells lie, with space between rows: claims, each with a set."""
-    rows = part[["id", "set"]].ne(part[["id", "set"]].shift()).any(axis=1).to_numpy()
-    return np.arange(len(part)) + APART * (np.cumsum(rows) - 1)
+def _placed(part: pd.DataFrame) -> pd.DataFrame:
+    """Add the height `row` of each row on an axis, and `y` of each cell."""
+    row, y, rows = -1.0, [], []
+    for _, cells in part.groupby(["id", "set"], sort=False):
+        row += 1 + HEADING * bool(cells["heading"].iloc[0])
+        y += [row + APART * (place - (len(cells) - 1) / 2) for place in range(len(cells))]
+        rows += [row] * len(cells)
+    return part.assign(row=rows, y=y)
 
 
-def _draw_unit(panel: Axes, part: pd.DataFrame) -> None:
+def _draw(panel: Axes, part: pd.DataFrame) -> None:
     ratio, share = (part["statistic"].iloc[0] == name for name in ("sd-ratio", "share"))
-    part = part.assign(y=_places(part))
-    rows = [cells for _, cells in part.groupby(["id", "set"], sort=False)]
-    drawing.scale(panel, "x", part["statistic"].iloc[0], part["effect"])
+    drawing.scale(panel, "x", part["statistic"].iloc[0], part["effect"].iloc[:1])
+    neutral = None if share else float(ratio)
     margins = part["margin"].to_numpy(float)
     known = part[["low", "high", "effect", "paper"]].to_numpy(float).ravel()
-    neutral = [] if share else [[float(ratio)], 1 / margins if ratio else -margins]
-    _limit(panel, np.concatenate([known, margins, *neutral]))
-    if not share:
-        panel.axvline(float(ratio), color="0.25", lw=1, zorder=1)
-    for cells in rows:
-        top, bottom = cells["y"].iloc[0] - 0.5 - APART / 4, cells["y"].iloc[-1] + 0.5 + APART / 4
-        margin = cells["margin"].max()
-        if not np.isnan(margin):
-            span = (margin, 1 / margin) if ratio else (-margin, margin)
-            span = (panel.get_xlim()[0], margin) if share else span
-            panel.fill_betweenx([top, bottom], *span, color="0.9", lw=0, zorder=0)
-        panel.vlines(cells["paper"].iloc[0], top, bottom, color="0.1", lw=1.2, zorder=2)
-        for row in cells.itertuples():
-            mark, colour = READING_MARKS[row.reading][0], COLOURS[row.verdict]
-            panel.hlines(row.y, row.low, row.high, color=colour, lw=1.6)
-            panel.plot(row.effect, row.y, mark, ms=3.8, color=colour, zorder=3)
-            if cells["verdict"].nunique() > 1:
-                drawing.beside(panel, row.verdict, 1, row.y, 6, color=colour)
-        if cells["verdict"].nunique() == 1:
-            verdict = cells["verdict"].iloc[0]
-            drawing.beside(panel, verdict, 1, cells["y"].mean(), 6, color=COLOURS[verdict])
-    panel.set_ylim(part["y"].iloc[-1] + 0.5 + APART / 2, -0.5 - APART / 2)
-    panel.set_yticks([cells["y"].mean() for cells in rows], map(_name, rows), size=SMALL)
-    panel.tick_params(axis="y", length=0)
+    others = [] if share else [[neutral], 1 / margins if ratio else -margins]
+    drawing.limit(panel, np.concatenate([known, margins, *others]))
+    for _, cells in part.groupby(["id", "set"], sort=False):
+        _draw_row(panel, cells, neutral)
+    panel.set_yticks([])
     panel.spines["left"].set_visible(False)
+    name = part["axis"].iloc[0] + (", log axis" if ratio else "")
+    panel.set_xlabel(name, size=TYPE - 0.5, labelpad=1)
+    panel.tick_params(axis="x", labelsize=TYPE - 0.5, pad=2)
 
 
-def _name(cells: pd.DataFrame) -> str:
-    text, set = label(cells["id"].iloc[0]), cells["set"].iloc[0]
-    return text if set == NONE else f"{text}: {SET_LABELS[set]}"
+def _draw_row(panel: Axes, cells: pd.DataFrame, neutral: float | None) -> None:
+    first, margin = cells.iloc[0], cells["margin"].max()
+    row, top, bottom = first["row"], first["row"] - 0.46, first["row"] + 0.46
+    if first["heading"]:
+        drawing.beside(panel, first["heading"], 0, row - HEADING, NAMES, size=TYPE, weight="bold")
+    drawing.beside(panel, _name(first), 0, row, NAMES + 8, size=TYPE)
+    if not np.isnan(margin):
+        ratio = first["statistic"] == "sd-ratio"
+        span = (
+            panel.get_xlim()[0] if neutral is None else 1 / margin if ratio else -margin,
+            margin,
+        )
+        panel.fill_betweenx([top, bottom], *sorted(span), color="0.9", lw=0, zorder=0)
+    if neutral is not None:
+        panel.plot([neutral, neutral], [row - 0.5, row + 0.5], color="0.25", lw=1, zorder=1)
+    panel.vlines(first["paper"], top, bottom, color=INK, lw=1.6, zorder=2)
+    for cell in cells.itertuples():
+        look = LOOKS[cell.verdict]
+        panel.hlines(cell.y, cell.low, cell.high, color=look["ec"], lw=1.5)
+        mark, style = READING_MARKS[cell.reading][0], {"mec": look["ec"], "mfc": look["fc"]}
+        panel.plot(cell.effect, cell.y, mark, ms=3.9, mew=1, zorder=3, **style)
+        at = NUMBERS + COLUMN * READINGS.index(cell.reading or READINGS[0])
+        ink = look["ec"] if look["fc"] != look["ec"] else "white"
+        box = {"boxstyle": "round,pad=0.22,rounding_size=0.5", "lw": 0.9, **look}
+        drawing.beside(panel, _number(cell), 1, row, at, size=7.5, color=ink, bbox=box, ha="center")
+    words = list(dict.fromkeys(cells["verdict"]))
+    size: dict[str, Any] = {"size": TYPE} if len(words) == 1 else {"size": 7, "linespacing": 1.05}
+    drawing.beside(panel, ", ".join(words).replace(", ", ",\n", 1), 1, row, WORDS, **size)
 
 
-def _limit(panel: Axes, values: NDArray[np.float64]) -> None:
-    """Give the x axis room for all values, so that something can be drawn up to its ends."""
-    log = panel.get_xscale() == "log"
-    used = values[np.isfinite(values) & ((values > 0) | (not log))]
-    used = np.log(used) if log else used
-    room = 0.05 * (used.max() - used.min()) or 0.05
-    ends = used.min() - room, used.max() + room
-    panel.set_xlim(*(np.exp(ends) if log else ends))
+def _head(panel: Axes, top: float) -> None:
+    """Name the columns at the right, above the first panel."""
+    style: dict[str, Any] = {"size": 7.5, "va": "top", "linespacing": 1.3}
+    for place, (name, sign) in enumerate(zip(READINGS, "●■◆", strict=True)):
+        text = f"{sign}\n" + re.sub(r" \(|, maximum ", "\n", F_LABELS[name]).rstrip(")")
+        drawing.beside(panel, text, 1, top, NUMBERS + COLUMN * place, ha="center", **style)
+    drawing.beside(panel, "\n\nverdict", 1, top, WORDS, **style)
+
+
+def _name(cell: pd.Series) -> str:
+    task, set = TASKS[cell["task"]], cell["set"]
+    return task if set == NONE else f"{task}, {SET_LABELS[set]}"
+
+
+def _number(cell: Any) -> str:
+    """Return an effect with as many decimals as are of use."""
+    if np.isnan(cell.effect):
+        return "–"
+    decimals = {"mean": 3, "sd-ratio": 2, "share": 0}.get(cell.statistic, 1)
+    return f"{cell.effect:z.{decimals}f}".replace("-", "\N{MINUS SIGN}")

@@ -28,6 +28,7 @@ from replication.evidence.calibration import (
     chosen,
     condition,
     finalists,
+    judged_table,
     kl_divergence,
     nearest,
     points,
@@ -305,6 +306,22 @@ def test_table_of_a_stage() -> None:
         assert row["default"] == (number == points().index(chosen("printed")))
     only = calibration_table(trials, "screen")
     assert points().index(tuple(only[COLUMNS].iloc[0])) == 7
+
+
+def test_the_judging_run_is_a_point_like_the_others() -> None:
+    """Its trials of the unified method without incorrect demonstrations stand at the defaults."""
+    made = {"printed": sample(36.0, 7.0, 40), "updated": sample(33.0, 5.0, 40)}
+    parts = [
+        trials_of("", 0, counts + more).assign(part=np.nan, method=method, reading=reading)
+        for reading, counts in made.items()
+        for more, method in enumerate(("unified", "unified-incorrect"))
+    ]
+    table = judged_table(pd.concat(parts, ignore_index=True)).set_index("F-INDEX")
+    assert table["default"].all()
+    assert set(table.index) == set(made)
+    for reading, counts in made.items():
+        mean, sd = table.loc[reading, ["mean", "sd"]]
+        assert (mean, sd) == pytest.approx((counts.mean(), counts.std(ddof=1)))
 
 
 @pytest.mark.parametrize("off", [-1e-6, 1e-6])

@@ -10,7 +10,9 @@ from matplotlib.text import Text
 
 def shown_texts(figure: Figure) -> list[Text]:
     """Return all texts that are drawn: not the labels of ticks beyond the ends of an axis."""
-    texts = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    texts = [*figure.texts]
+    for legend in figure.legends:
+        texts += [legend.get_title(), *legend.get_texts()]
     for panel in figure.axes:
         texts += panel.texts
         texts += [panel.title, panel._left_title]  # type: ignore[attr-defined]

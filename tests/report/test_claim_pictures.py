@@ -29,8 +29,16 @@ from replication.evidence.verdicts import (
     by_claim,
 )
 from replication.irl import READINGS
-from replication.report import calibration, sensitivity, specification_curve, sweep, verdicts
-from replication.report.drawing import OUTCOMES, UNITS
+from replication.report import (
+    calibration,
+    sensitivity,
+    specification_curve,
+    sweep,
+    variance,
+    verdicts,
+)
+from replication.report.choices import acts, title, value
+from replication.report.drawing import OUTCOMES, UNITS, statement
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, sentence
 from replication.report.style import save_figure
@@ -94,8 +102,11 @@ def some_verdicts() -> pd.DataFrame:
             margin = np.nan if claim.statistic == "mean" or np.isnan(effect) else margin
             row: dict[str, Any] = {
                 "id": claim.id,
+                "claim": claim.claim,
+                "task": claim.task,
                 "measure": claim.measure,
                 "statistic": claim.statistic,
+                "n": 1000,
             }
             row |= {"reading": reading, "set": set}
             row |= {"paper": claim.paper_effect, "why": "some"}
@@ -116,6 +127,7 @@ def some_points() -> pd.DataFrame:
         high=table["mean"] + 0.7,
         sd_low=table["sd"] * 0.9,
         sd_high=table["sd"] * 1.1,
+        n=200,
         kl_divergence=order / 10,
         fits=order < 5,
         default=order < 2,
@@ -127,6 +139,8 @@ def some_points() -> pd.DataFrame:
 EFFECTS = some_effects()
 VERDICTS = some_verdicts()
 POINTS = some_points()
+JUDGED = POINTS.iloc[[-2, -1]].assign(mean=[36.0, 33.0], low=35.0, high=37.0, n=1000)
+JUDGED["F-INDEX"] = ["printed", "updated"]
 SHARES = shares_table(EFFECTS)
 PAIRS = [(0, 0), (10, 75), (30, 185), (100, 365), (300, 581), (1000, 1128), (1565, 1565)]
 NUMBERS = pd.DataFrame(
@@ -146,8 +160,8 @@ PICTURES = {
     "ratios": specification_curve.curve(EFFECTS, DRAWN[1]),
     "single": sensitivity.single(EFFECTS, DRAWN),
     "soccer": sensitivity.single(EFFECTS, KICKED),
-    "shares": sensitivity.shares(SHARES),
-    "points": calibration.points(POINTS),
+    "shares": variance.shares(SHARES),
+    "points": calibration.points(POINTS, JUDGED),
     "numbers": sweep.numbers(NUMBERS),
 }
 
@@ -195,13 +209,14 @@ def test_curve_is_the_sorted_effects(at: int, drawings: dict[str, Figure]) -> No
 
 
 def test_choices_stand_below_their_effects(drawings: dict[str, Figure]) -> None:
-    """Each column of the matrix has one tick for each choice, in the colour of its outcome."""
+    """Each column of the matrix has one tick for each choice that is shown."""
     matrix = drawings["curve"].axes[2]
+    choices = sum("of the variance" in text.get_text() for text in matrix.texts)
     paths = [path for one in matrix.collections for path in one.get_paths()]
     ticks = [float(np.asarray(path.vertices)[0, 0]) for path in paths]
     columns, counts = np.unique(ticks, return_counts=True)
     np.testing.assert_array_equal(columns, np.arange(len(FACTORIAL)))
-    assert set(counts) == {len(MAZES.factorial.choices)}
+    assert set(counts) == {choices}
     assert drawings["curve"].axes[0].get_xlim() == matrix.get_xlim()
 
 
@@ -210,7 +225,7 @@ def test_the_band_without_any_effect_is_that_of_the_ranks(drawings: dict[str, Fi
     for kind, shown in (("curve", True), ("ratios", False)):
         figure = drawings[kind]
         (text,) = figure.axes[0].texts
-        assert ("jointly: median p < 0.001, number p = 0.032" in text.get_text()) == shown
+        assert ("median p < 0.001, number that hold p = 0.032" in text.get_text()) == shown
         labels = [text.get_text() for text in figure.legends[0].get_texts()]
         assert ("95 % without any effect" in labels) == shown
     own = EFFECTS[(EFFECTS["claim"] == DRAWN[0]) & (EFFECTS["group"] == "factorial")]
@@ -241,35 +256,116 @@ def test_curve_without_any_effect_is_drawn_without_counts() -> None:
     figure = drawn(picture)
     assert not figure.axes[0].texts
     assert "0 specifications" in figure.axes[2].get_xlabel()
-    labels = [text.get_text() for text in drawn(PICTURES["ratios"]).axes[2].texts]
-    assert [text.get_text() for text in figure.axes[2].texts] == labels
+
+
+def moved(claim: str, **by: float) -> pd.DataFrame:
+    """Return the effects of a claim over the factorial that single values of choices move."""
+    rows = EFFECTS[(EFFECTS["claim"] == claim) & (EFFECTS["group"] == "factorial")]
+    rng = np.random.default_rng(np.random.SeedSequence(3))
+    effect = rng.normal(scale=0.1, size=len(rows))
+    for choice, size in by.items():
+        effect += size * rows["specification"].str.contains(f"{choice.replace('_', '-')}=")
+        effect += size * rows["specification"].str.contains(choice.replace("__", "="), regex=False)
+    return rows.assign(effect=effect, low=effect - 0.1, high=effect + 0.1)
+
+
+def test_choices_that_matter_stand_first() -> None:
+    """A curve shows the choices by their share of the variance, and names the others below."""
+    table = moved("SAVES-OPEN", TIES__first=1.0, MAP__open=6.0, **{"ADABOOST-RULE__vote": 9.0})
+    figure = drawn(specification_curve.curve(table, "SAVES-OPEN"))
+    texts = [text.get_text() for text in figure.axes[2].texts]
+    named = [text for text in texts if text in {title(id) for id in MAZES.factorial.choices}]
+    assert named == ["map", "how ties are broken"]
+    shares = [int(text.split()[0]) for text in texts if "of the variance" in text]
+    assert shares == sorted(shares, reverse=True)
+    assert len(shares) == 2
+    note = figure.legends[0].get_title().get_text()
+    assert "first weights" in note
+    assert "AdaBoost" not in note  # it cannot act on the claim, whatever chance says
+
+
+def test_at_most_five_choices_are_shown() -> None:
+    """The others have to be looked up in the table."""
+    ids = list(MAZES.factorial.choices)[:-1]
+    table = moved("SAVES-OPEN", **{f"{id}__{default_of(id)}": 2.0 for id in ids})
+    figure = drawn(specification_curve.curve(table, "SAVES-OPEN"))
+    texts = [text.get_text() for text in figure.axes[2].texts]
+    assert sum("of the variance" in text for text in texts) == 5
+    assert_legible(figure)
 
 
 def test_defaults_are_bold(drawings: dict[str, Figure]) -> None:
     """Below a curve the default value of each choice is the bold one."""
     texts = drawings["curve"].axes[2].texts
-    bold = [text.get_text() for text in texts if text.get_fontweight() == "bold"]
-    assert bold == [str(default_of(id)) for id in MAZES.factorial.choices]
+    bold = {text.get_text() for text in texts if text.get_fontweight() == "bold"}
+    defaults = {value(id, str(default_of(id))) for id in MAZES.factorial.choices}
+    assert bold
+    assert bold <= defaults
+
+
+def test_percentages_stand_beside_their_bars(drawings: dict[str, Figure]) -> None:
+    """Each value has the share of its specifications in which the claim holds, off the bars."""
+    panel = drawings["curve"].axes[3]
+    shares = [bar.get_width() for group in panel.containers for bar in group]
+    assert [text.get_text() for text in panel.texts] == [f"{100 * share:.0f} %" for share in shares]
+    right = panel.get_window_extent().x1
+    assert all(text.get_window_extent().x0 > right for text in panel.texts)
 
 
 def test_single_rows_are_the_effects(drawings: dict[str, Figure]) -> None:
-    """Each panel has the effects of its claim from top to bottom, the default first."""
+    """Each panel has the effects of its claim from top to bottom, if the choice can act on it."""
     for panel, claim in zip(drawings["single"].axes, DRAWN, strict=True):
         points = [np.asarray(one.get_xydata()) for one in panel.lines if one.get_marker() != "None"]
         x, y = np.vstack(points).T
         own = EFFECTS[(EFFECTS["claim"] == claim) & (EFFECTS["group"] == "single")]
-        np.testing.assert_array_equal(x[y.argsort()], own["effect"])
+        acting = [acts(name.partition("=")[0], claim) for name in own["specification"]]
+        assert 0 < sum(acting) < len(own)
+        np.testing.assert_array_equal(x[y.argsort()], own.loc[acting, "effect"])
+
+
+def test_rows_that_change_nothing_are_named_below() -> None:
+    """A row with the default's numbers in all panels is left out; in some, it says so there."""
+    table = EFFECTS.copy()
+    numbers = ["effect", "low", "high"]
+    own = table["group"] == "single"
+    for claims, name in ((DRAWN, "TIES=first"), (DRAWN[:1], "W-NORM=unit")):
+        for claim in claims:
+            rows = own & (table["claim"] == claim)
+            default = table.loc[rows & (table["specification"] == "default"), numbers]
+            same = rows & (table["specification"] == name)
+            table.loc[same, numbers] = default.to_numpy()
+    figure = drawn(sensitivity.single(table, DRAWN))
+    labels = [text.get_text() for text in figure.axes[0].texts]
+    assert title("TIES") not in labels
+    assert title("W-NORM") in labels
+    note = figure.legends[0].get_title().get_text()
+    assert "how ties are broken (first)" in note.replace("\n", " ")
+    marks = [[line.get_marker() for line in panel.lines].count("$=$") for panel in figure.axes]
+    assert marks == [1, 0, 0, 0]
 
 
 # --- verdicts --------------------------------------------------------------------------------
 
 
 def compared(table: pd.DataFrame) -> list[tuple[Axes, pd.DataFrame]]:
-    """Return each panel of the verdicts, and what it has to show in rows from the top."""
-    figure = drawn(verdicts.verdicts(table))
-    units = [UNITS.get(key) for key in zip(table["statistic"], table["measure"], strict=True)]
-    parts = [table[[own == unit for own in units]] for unit in dict.fromkeys(UNITS.values())]
-    return list(zip(figure.axes, parts, strict=True))
+    """Return each panel of the verdicts, and what it has to show in rows from the top.
+
+    `by` is what the numbers of a row are multiplied by: shares are drawn as per cents, and so are
+    effects whose margin is a share.
+    """
+    units = list(UNITS)
+    keys = zip(table["statistic"], table["measure"], strict=True)
+    order = [units.index(key) if key in units else -1 for key in keys]
+    table = table.assign(order=order)[[place >= 0 for place in order]]
+    table = table.sort_values("order", kind="stable")
+    fraction = table["id"].map({claim.id: claim.fraction for claim in load_claims().claim})
+    by = (100 * fraction.astype(float) / table["margin"]).where(fraction.notna(), 1.0)
+    share, mean = table["statistic"] == "share", table["statistic"] == "mean"
+    panel = table["statistic"].where(fraction.isna(), "spared")
+    table = table.assign(by=by.where(~share, 100.0), panel=panel)
+    assert (share | mean | fraction.notna() | table["statistic"].isin(["saved", "sd-ratio"])).all()
+    parts = [part for _, part in table.groupby("panel", sort=False)]
+    return list(zip(drawn(verdicts.verdicts(table)).axes, parts, strict=True))
 
 
 def marks_of(panel: Axes) -> list[tuple[float, float, str]]:
@@ -294,36 +390,53 @@ def test_every_cell_is_drawn_at_its_effect() -> None:
     """
     kinds = {"printed": "o", "updated": "s", "at-once": "D", "": "o"}
     for panel, part in compared(VERDICTS):
-        fractions = [load_claims().by_id(id).fraction for id in part["id"]]
-        scale = 100 * pd.Series(fractions, part.index, dtype=float) / part["margin"]
-        scale = scale.where(pd.notna(fractions), 1.0)
         marks = marks_of(panel)
         assert len(marks) == len(part)
         assert len({y for y, _, _ in marks}) == len(part)
-        np.testing.assert_allclose([x for _, x, _ in marks], part["effect"] * scale)
+        np.testing.assert_allclose([x for _, x, _ in marks], part["effect"] * part["by"])
         assert [kind for _, _, kind in marks] == [kinds[name] for name in part["reading"]]
         level = sorted((s[0, 1], *s[:, 0]) for s in segments_of(panel) if s[0, 1] == s[1, 1])
-        ends = part[["low", "high"]].mul(scale, axis=0).to_numpy()
+        ends = part[["low", "high"]].mul(part["by"], axis=0).to_numpy()
         due = np.column_stack([[y for y, _, _ in marks], ends])
         np.testing.assert_allclose(level, due[~np.isnan(ends).any(axis=1)])
 
 
-def test_the_verdict_stands_beside_its_cell() -> None:
-    """Whatever its colour, each cell has its verdict in words at its height.
+def beside(panel: Axes, side: int) -> list[Any]:
+    """Return the texts at the left or right of a panel, from the top and from the left."""
+    texts: list[Any] = [text for text in panel.texts if text.xy[0] == side]  # type: ignore[attr-defined]
+    return sorted(texts, key=lambda text: (text.xy[1], text.xyann[0]))
 
-    Where all cells of a row agree the word stands once, in the middle.
-    """
+
+def test_the_verdict_stands_beside_its_cell() -> None:
+    """A row has the effect of each cell in the look of its verdict, and the verdict in words."""
+    looks: dict[str, set[tuple[Any, ...]]] = {}
     for panel, part in compared(VERDICTS):
-        heights = [y for y, _, _ in marks_of(panel)]
-        due = []
-        for _, cells in part.assign(y=heights).groupby(["id", "set"], sort=False):
-            if cells["verdict"].nunique() == 1:
-                due.append((cells["verdict"].iloc[0], cells["y"].mean()))
-            else:
-                due += list(zip(cells["verdict"], cells["y"], strict=True))
-        words = [(text.get_text(), float(text.xy[1])) for text in panel.texts]  # type: ignore[attr-defined]
-        assert [word for word, _ in words] == [word for word, _ in due]
-        assert [y for _, y in words] == pytest.approx([y for _, y in due])
+        texts = [text for text in beside(panel, 1) if text.xy[1] >= 0]
+        for _, cells in part.groupby(["id", "set"], sort=False):
+            *numbers, word = texts[: len(cells) + 1]
+            texts = texts[len(cells) + 1 :]
+            assert word.get_text().replace("\n", " ") == ", ".join(dict.fromkeys(cells["verdict"]))
+            assert len({text.xy[1] for text in (*numbers, word)}) == 1
+            for text, cell in zip(numbers, cells.itertuples(), strict=True):
+                shown = float(text.get_text().replace("–", "nan").replace("\N{MINUS SIGN}", "-"))
+                assert shown == pytest.approx(cell.effect * cell.by, abs=0.5, nan_ok=True)
+                box = text.get_bbox_patch()
+                look = (box.get_edgecolor(), box.get_facecolor(), box.get_linestyle())
+                looks.setdefault(cell.verdict, set()).add(look)
+        assert not texts
+    assert all(len(look) == 1 for look in looks.values())
+    assert len(set.union(*looks.values())) == len(looks) == 5
+
+
+def test_each_claim_has_a_heading_in_its_own_words() -> None:
+    """Above the rows of a claim stands what it says, on whichever task; each row names its task."""
+    for panel, part in compared(VERDICTS):
+        texts = beside(panel, 0)
+        bold = [text.get_text() for text in texts if text.get_fontweight() == "bold"]
+        claims = list(dict.fromkeys(part["claim"].map(statement)))
+        assert bold == claims
+        assert len(texts) == len(claims) + len(part[["id", "set"]].drop_duplicates())
+    assert all(" maze" not in statement(claim) for claim in VERDICTS["claim"][:60])
 
 
 def test_margins_and_no_effect_are_in_view() -> None:
@@ -335,25 +448,25 @@ def test_margins_and_no_effect_are_in_view() -> None:
             assert low < float(first["statistic"] == "sd-ratio") < high
         grey = [path for c in panel.collections for path in c.get_paths() if len(path) > 3]
         ends = {
-            (float(x.min()), float(x.max()))
+            tuple(np.round([x.min(), x.max()], 9))
             for x in (np.asarray(path.vertices)[:, 0] for path in grey)
         }
-        fraction = load_claims().by_id(first["id"]).fraction
-        margins = {100 * fraction} if fraction else set(part["margin"].dropna())
-        for margin in margins:
+        for margin in set((part["margin"] * part["by"]).dropna().round(9)):
             other = {"share": low, "sd-ratio": 1 / margin}.get(first["statistic"], -margin)
-            assert (min(margin, other), max(margin, other)) in ends
-            assert low <= min(margin, other)
-            assert max(margin, other) < high
-        assert len(ends) == len(margins)
+            due = round(min(margin, other), 9), round(max(margin, other), 9)
+            assert due in ends
+            assert low <= due[0] + 1e-9
+            assert due[1] < high
+            ends.remove(due)
+        assert not ends
 
 
 def test_the_papers_effect_stands_in_the_rows_of_its_claim() -> None:
     """An upright line in each row whose claim has a published effect, and nowhere else."""
     for panel, part in compared(VERDICTS):
         upright = [s[0, 0] for s in segments_of(panel) if s[0, 1] != s[1, 1]]
-        due = part.drop_duplicates(["id", "set"])["paper"].dropna()
-        assert upright == due.tolist()
+        rows = part.drop_duplicates(["id", "set"])
+        assert upright == (rows["paper"] * rows["by"]).dropna().tolist()
 
 
 def test_a_claim_without_any_effect_keeps_its_rows() -> None:
@@ -363,9 +476,8 @@ def test_a_claim_without_any_effect_keeps_its_rows() -> None:
     missing.loc[row, ["effect", "low", "high", "margin"]] = np.nan
     missing.loc[row, "verdict"] = NOT_TESTABLE
     (panel,) = drawn(verdicts.verdicts(missing[row])).axes
-    assert [text.get_text() for text in panel.texts] == [NOT_TESTABLE]
-    labels = [label.get_text() for label in panel.get_yticklabels()]
-    assert labels == ["saves iterations, soccer: all four kinds"]
+    assert [text.get_text() for text in beside(panel, 1)][-4:] == ["–", "–", "–", NOT_TESTABLE]
+    assert beside(panel, 0)[-1].get_text() == "soccer, all four kinds"
 
 
 def test_every_comparative_claim_has_a_unit() -> None:
@@ -377,34 +489,47 @@ def test_every_comparative_claim_has_a_unit() -> None:
 # --- calibration -----------------------------------------------------------------------------
 
 
+def marked(panel: Axes, marks: str) -> list[Any]:
+    """Return the lines of a panel that have one of the marks."""
+    return [line for line in panel.lines if str(line.get_marker()) in marks]
+
+
 def test_finalists_stand_at_their_numbers() -> None:
-    """Each finalist is a dot in the panel of its trace, filled if it fits, ringed if a default."""
+    """Each finalist is a mark in the panel of its trace, filled if it fits.
+
+    Its colour tells the rate of the trace and its shape the start.
+    """
+    looks: dict[str, set[tuple[Any, Any]]] = {"ALPHA": set(), "F-START": set()}
     for panel, (_, own) in zip(
         drawn(PICTURES["points"]).axes, POINTS.groupby("F-INDEX", sort=False), strict=True
     ):
-        dots = [line for line in panel.lines if line.get_marker() == "o"]
-        places = {
-            size: [
-                np.asarray(dot.get_xydata())[0].tolist()
-                for dot in dots
-                if dot.get_markersize() == size
-            ]
-            for size in (5, 11)
-        }
-        assert places[5] == own[["mean", "sd"]].to_numpy().tolist()
-        assert places[11] == own.loc[own["default"], ["mean", "sd"]].to_numpy().tolist()
-        filled = [dot.get_markerfacecolor() != "w" for dot in dots if dot.get_markersize() == 5]
-        assert filled == own["fits"].tolist()
-        (star,) = (line for line in panel.lines if line.get_marker() == "*")
+        *dots, judged = marked(panel, "osD")
+        places = [np.asarray(dot.get_xydata())[0].tolist() for dot in dots]
+        assert places == own[["mean", "sd"]].to_numpy().tolist()
+        assert [dot.get_markerfacecolor() != "w" for dot in dots] == own["fits"].tolist()
+        looks["ALPHA"] |= {*zip(own["ALPHA"], [d.get_markeredgecolor() for d in dots], strict=True)}
+        looks["F-START"] |= {*zip(own["F-START"], [d.get_marker() for d in dots], strict=True)}
+        (star,) = marked(panel, "*")
         assert np.asarray(star.get_xydata()).tolist() == [[40.10, 4.73]]
         assert star.get_markerfacecolor() == "none"  # it hides no dot
+        assert judged.get_color() not in {dot.get_markeredgecolor() for dot in dots}
+    for choice, pairs in looks.items():
+        assert len(pairs) == len({key for key, _ in pairs}) == POINTS[choice].nunique()
+        assert len({look for _, look in pairs}) == len(pairs)
 
 
-def test_no_ring_is_explained_where_there_is_none() -> None:
-    """If no finalist is a default, the legend does not speak of one."""
-    for table, count in ((POINTS, 1), (POINTS.assign(default=False), 0)):
-        (legend,) = drawn(calibration.points(table)).legends
-        assert [text.get_text() for text in legend.get_texts()].count("default") == count
+def test_the_judging_run_stands_beside_the_finalists() -> None:
+    """It has its own mark and both intervals in each panel, and its number of trials."""
+    figure = drawn(PICTURES["points"])
+    for panel, (_, row) in zip(figure.axes, JUDGED.iterrows(), strict=True):
+        point = marked(panel, "osD")[-1]
+        assert np.asarray(point.get_xydata()).tolist() == [[row["mean"], row["sd"]]]
+        level, upright = segments_of(panel)[-2:]
+        assert level[:, 0].tolist() == row[["low", "high"]].tolist()
+        assert upright[:, 1].tolist() == row[["sd_low", "sd_high"]].tolist()
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "judging run (1000 trials)" in labels
+    assert "and the judging run 36.0" in PICTURES["points"].words
 
 
 def test_finalists_are_a_table_too() -> None:
@@ -427,22 +552,42 @@ def test_finalists_are_a_table_too() -> None:
 # --- what the claims depend on ---------------------------------------------------------------
 
 
+def cells_of(figure: Figure) -> list[str]:
+    """Return the texts in the cells of the heat map."""
+    return [text.get_text() for panel in figure.axes[:2] for text in panel.texts]
+
+
 def test_cells_are_per_cents(drawings: dict[str, Figure]) -> None:
-    """The heat map writes each share of the variance as a per cent."""
-    shown = [text.get_text() for panel in drawings["shares"].axes[:2] for text in panel.texts]
-    shares = SHARES.loc[~SHARES["choice"].isin(OUTCOMES), "share"]
-    minus = "\N{MINUS SIGN}"
-    expected = [f"{round(100 * share)}".replace("-", minus) for share in shares]
+    """The heat map writes each share of the variance as a per cent, and none below zero."""
+    table = SHARES[~SHARES["choice"].isin(OUTCOMES)]
+    assert (table["share"] < 0).any()
+    expected = [
+        "·"
+        if not acts(row.choice, row.claim)
+        else "<1"
+        if row.share < 0.01
+        else f"{100 * row.share:.0f}"
+        for row in table.itertuples()
+    ]
+    shown = cells_of(drawings["shares"])
     assert sorted(text.replace("≥", "") for text in shown) == sorted(expected)
+    assert {"<1", "·"} < set(shown)
+
+
+def test_what_is_no_choice_is_explained(drawings: dict[str, Figure]) -> None:
+    """The figure says what few trials and choices together are."""
+    figure = drawings["shares"]
+    names = [label.get_text() for label in figure.axes[1].get_xticklabels()]
+    note = figure.legends[0].get_title().get_text().lower()
+    assert names == ["choices together", "few trials"]
+    assert all(f"{name}:" in note.replace("\n", " ") for name in names)
 
 
 def test_noise_of_all_the_variance_is_at_least_that() -> None:
     """Noise is cut off at the whole variance, and the cell says so."""
     noisy = SHARES.copy()
     noisy.loc[noisy["choice"] == NOISE, "share"] = 1.0
-    figure = drawn(sensitivity.shares(noisy))
-    shown = [text.get_text() for panel in figure.axes[:2] for text in panel.texts]
-    assert shown.count("≥100") == len(DRAWN)
+    assert cells_of(drawn(variance.shares(noisy))).count("≥100") == len(DRAWN)
 
 
 def test_missing_effects_are_told() -> None:
@@ -460,7 +605,7 @@ def test_words_name_the_counts() -> None:
     rows = EFFECTS[(EFFECTS["claim"] == "FASTER")]
     factorial = rows.loc[rows["group"] == "factorial", "outcome"].value_counts()
     words = PICTURES["curve"].words
-    assert f"FASTER holds in {factorial['holds']} of 240 specifications" in words
+    assert f"FASTER: holds in {factorial['holds']} of 240 specifications" in words
     assert f"open in {factorial['open']}, reversed in {factorial['reversed']}" in words
     uncapped = rows[(rows["group"] == "factorial") & (rows["capped"] == 0)]
     held = (uncapped["outcome"] == "holds").sum()

@@ -14,8 +14,8 @@ from replication.evidence.sensitivity import HOLDS, JOINT, OPEN, REVERSED, UNDEF
 from replication.evidence.specifications import Specification, load_specifications
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
+from replication.report.choices import NAMES
 from replication.report.findings import (
-    NAMES,
     at_once,
     calibrated,
     caveats,
@@ -244,9 +244,11 @@ def test_dependence_lists_mazes_and_soccer_apart() -> None:
     assert lines[-1].startswith("How far chance goes: the rule of AdaBoost-IRL cannot act on")
 
 
-def test_every_choice_of_the_factorial_has_a_name() -> None:
-    """A choice that is added to the factorial has to be named in words, too."""
-    assert set(NAMES) == set(load_specifications().mazes.factorial.choices)
+def test_every_choice_that_is_varied_has_a_name() -> None:
+    """A choice that is added to the specifications has to be named in words, too."""
+    plan = load_specifications()
+    parts = (plan.mazes.factorial, plan.mazes.single, plan.soccer.single)
+    assert set(NAMES) == {id for part in parts for id in part.choices}
 
 
 def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
