@@ -93,7 +93,7 @@ def learning(
             runs = _with_rewards([run(key, k) for key in keys(reading, set)])
             tables += [each.assign(under=reading, nearest_to=part) for each in runs]
             text = _why(saved, part, k) + _outcome(runs, known)
-            plays.append({"text": text, "panels": _panels(runs)})
+            plays.append({"text": text, "panels": _panels(runs, place.steps)})
             if part == "median":
                 without, given = (len(each) - 1 for each in runs)
                 medians.append(f"{F_LABELS[reading]}: {without} without and {given} with")
@@ -169,9 +169,9 @@ def _changes(weights: Floats, most: float) -> list[str]:
     ]
 
 
-def _panels(runs: list[pd.DataFrame]) -> list[dict[str, object]]:
+def _panels(runs: list[pd.DataFrame], steps: str) -> list[dict[str, object]]:
     """Return both sides of a player; None stands for a frame that is as on the first side."""
-    first, second = map(_panel, runs)
+    first, second = (_panel(run, steps) for run in runs)
     pairs = zip_longest(first["frames"], second["frames"])
     same = [one == other for one, other in pairs]
     second["frames"] = [
@@ -180,11 +180,11 @@ def _panels(runs: list[pd.DataFrame]) -> list[dict[str, object]]:
     return [first, second]
 
 
-def _panel(run: pd.DataFrame) -> dict[str, Any]:
+def _panel(run: pd.DataFrame, steps: str) -> dict[str, Any]:
     """Return one side of a player."""
     method = get_method(run["method"].iloc[0])
     frames = [
-        [row.way, f"d = {row.error:.3g}, {row.moves} moves", f"{row.end} 0", row.rewards]
+        [row.way, f"d = {row.error:.3g}, {row.moves} {steps}", f"{row.end} 0", row.rewards]
         for row in run.itertuples()
     ]
     frames[-1][1] = f"d = {run['error'].iloc[-1]:.3g} after {len(run) - 1} iterations"

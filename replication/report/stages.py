@@ -45,6 +45,8 @@ class Stage:
         How rewards are drawn, see :func:`replication.report.moving.player_page`.
     close
         What is seen of one mark from close to, as `view`.
+    steps
+        What the agent's steps are called.
     points
         Returns where a trajectory, given as states and actions, leads.
     weights
@@ -55,6 +57,7 @@ class Stage:
     still: str
     marks: dict[str, Any]
     close: str
+    steps: str
     points: Callable[[Ints, Ints], Points]
     weights: Callable[[Floats], Floats]
 
@@ -116,6 +119,7 @@ def _maze(demos: Demos) -> Stage:
         still="".join(still),
         marks=marks,
         close="-3.4 -4.4 12.8 8.8",
+        steps="moves",
         points=points,
         weights=lambda weights: weights.reshape(len(weights), -1),
     )
@@ -161,6 +165,7 @@ def _field(demos: Demos) -> Stage:
         still="".join(still),
         marks=marks,
         close="-40 -27.5 80 55",
+        steps="decisions",
         points=points,
         weights=weights,
     )
