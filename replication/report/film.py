@@ -1,51 +1,29 @@
-"""Episodes of robot soccer, moving: as a GIF, and as a player with buttons."""
+"""Episodes of robot soccer, moving."""
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.animation import FuncAnimation, PillowWriter
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from replication.envs.environment import Environment
+from replication.demos.model import Demos
+from replication.envs.soccer import rules
 from replication.envs.soccer.field import as_soccer
 from replication.envs.soccer.replay import replay
-from replication.files import read_file, scratch_folder, write_file
 from replication.irl import Trial
-from replication.report.moving import Player, player
-from replication.report.pitch import BLUE, PINK, YELLOW, Movers, draw_pitch, obstacle_columns
-from replication.report.style import WIDTH, legend_below, style
-
-FRAMES_A_SECOND, LAST_FRAMES, DPI = 5, 5, 90
-
-
-@dataclass(frozen=True)
-class Film:
-    """A moving figure, its numbers (a row for each border between two decisions), and its words."""
-
-    figure: Figure
-    animation: FuncAnimation
-    numbers: pd.DataFrame
-    words: str
-
-    def player(self) -> Player:
-        """Return the film with buttons and a slider."""
-        html = player(self.animation, self.words, frames_a_second=FRAMES_A_SECOND)
-        return Player(html, self.numbers, self.words)
-
-    def save_gif(self, path: Path) -> Path:
-        """Write the film as a GIF, whole or not at all."""
-        with scratch_folder() as folder, style():
-            draft = folder / "draft.gif"
-            self.animation.save(draft, writer=PillowWriter(fps=FRAMES_A_SECOND), dpi=DPI)
-            return write_file(path, read_file(draft))
+from replication.report.moving import Player, key_entry, player_page
+from replication.report.pitch import (
+    BLUE,
+    BODY,
+    NOSE,
+    STRIPE,
+    VERMILION,
+    YELLOW,
+    obstacle_columns,
+)
+from replication.report.stages import EXPERT, METRE, metres, stage
 
 
 def turning_points(trial: Trial) -> dict[str, Iterable[int]]:
@@ -54,68 +32,70 @@ def turning_points(trial: Trial) -> dict[str, Iterable[int]]:
     return {f"iteration {i}": trial.episodes[i].actions.tolist() for i in iterations}
 
 
-def film(
-    environment: Environment, episodes: Mapping[str, Iterable[int]], *, decisions: int = 40
-) -> Film:
-    """Show episodes, actions by title, side by side, with a frame for each of so many decisions.
-
-    An episode that is over keeps its last frame, and so does the whole for a second.
-    """
-    field = as_soccer(environment)
+def film(demos: Demos, episodes: Mapping[str, Iterable[int]]) -> Player:
+    """Show episodes, given as actions by title, with a frame for each border of two decisions."""
+    field, place = as_soccer(demos.environment), stage(demos)
     tables = {title: replay(field, actions) for title, actions in episodes.items()}
-    ends = {title: _end(table, decisions) for title, table in tables.items()}
-    with style():
-        size = min(WIDTH / len(tables), 4.0)
-        figure = Figure(figsize=(WIDTH, size * 0.87 + 0.68), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        panels = np.atleast_1d(figure.subplots(1, len(tables)))
-        movers, trails = [], []
-        for panel in panels:
-            draw_pitch(panel)
-            panel.set(xticks=[], yticks=[])
-            trails += panel.plot([], [], color=PINK, marker="o", ms=2, lw=1.2, zorder=3)
-            movers.append(Movers(panel))
-
-        def draw(frame: int) -> list[Any]:
-            for panel, mover, trail, title in zip(panels, movers, trails, tables, strict=True):
-                table = tables[title]
-                last = min(len(table) - 1, decisions)
-                now = min(frame, last)
-                row = table.iloc[now]
-                obstacles = [row[names].to_numpy(float) for names in obstacle_columns("x", "y")]
-                mover.place(row[["x", "y", "heading"]], row[["ball_x", "ball_y"]], obstacles)
-                trail.set_data(table["x"][: now + 1], table["y"][: now + 1])
-                status = ends[title] if now == last else f"{row['time']:.1f} s, decision {now}"
-                panel.set_title(f"{title}\n{status}", loc="left", fontsize=8.5)
-            return []
-
-        draw(0)
-        handles = [
-            Line2D([], [], color=BLUE, marker="s", ms=6, lw=0, label="controlled robot"),
-            Line2D([], [], color=PINK, marker="o", ms=2, label="its way, a dot a decision"),
-            Line2D([], [], color=YELLOW, marker="s", ms=6, mec="0.2", lw=0, label="obstacle"),
-            Line2D([], [], color="white", marker="o", ms=5, mec="black", lw=0, label="ball"),
-        ]
-        legend_below(figure, handles)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        longest = min(max(map(len, tables.values())) - 1, decisions)
-        frames = [*range(longest), *[longest] * LAST_FRAMES]
-        pause = 1000 // FRAMES_A_SECOND
-        animation = FuncAnimation(
-            figure, draw, frames=frames, interval=pause, cache_frame_data=False
-        )
+    ends = "; ".join(f"{title}: {_end(table)}" for title, table in tables.items())
+    content = {
+        "title": "Episodes of robot soccer",
+        "unit": "decision",
+        "rate": 8,
+        "continuous": True,
+        "view": place.view,
+        "still": place.still,
+        "movers": [*[OBSTACLE] * len(rules.PATHS), BALL, ROBOT],
+        "marks": None,
+        "chart": "",
+        "key": "".join(key_entry(*entry) for entry in KEY),
+        "choices": [
+            {"name": "Episode", "options": [*map(html.escape, tables)], "start": len(tables) - 1}
+        ],
+        "plays": [{"text": "", "panels": [_panel(table)]} for table in tables.values()],
+    }
+    words = f"Episodes of robot soccer, decision by decision. {ends[:1].upper()}{ends[1:]}."
     numbers = pd.concat(tables, names=["episode", None]).reset_index("episode")
-    words = "; ".join(f"{title}: {end}" for title, end in ends.items())
-    words = f"The robot's way in some episodes, moving. {words}"
-    return Film(figure, animation, numbers, words)
+    return Player(player_page(content, words), numbers, words)
 
 
-def _end(table: pd.DataFrame, decisions: int) -> str:
-    """Return how an episode ends, if at most so many decisions of it are shown."""
+def _polygon(shape: Iterable[tuple[float, float]], attributes: str) -> str:
+    """Return a shape, given in sides of a robot that heads to the right, as SVG."""
+    side = METRE * rules.ROBOT_SIDE
+    corners = " ".join(f"{side * x:g},{-side * y:g}" for x, y in shape)
+    return f'<polygon points="{corners}" {attributes}/>'
+
+
+OUTLINE = 'stroke="#333" stroke-width="1.5"'
+ROBOT = _polygon(BODY, f'fill="{BLUE}" {OUTLINE}') + _polygon(NOSE, 'fill="#fff"')
+OBSTACLE = _polygon(BODY, f'fill="{YELLOW}" {OUTLINE}') + _polygon(STRIPE, f'fill="{VERMILION}"')
+BALL = f'<circle r="{METRE * rules.BALL_RADIUS:g}" fill="#fff" stroke="#000" stroke-width="2.5"/>'
+KEY = (
+    ("-40 -27 80 54", ROBOT, "controlled robot"),
+    ("-40 -27 80 54", OBSTACLE, "obstacle"),
+    ("-40 -27 80 54", BALL, "ball"),
+    ("-12 -8 24 16", '<path class="way" d="M-10 0H10"/>', "the robot\u2019s way"),
+    ("-12 -8 24 16", EXPERT, "the expert\u2019s way"),
+)
+
+
+def _panel(table: pd.DataFrame) -> dict[str, object]:
+    """Return the panel of an episode."""
+    headings = -np.degrees(np.unwrap(table["heading"]))  # it turns the short way
+    bodies = [metres(table[names]) for names in obstacle_columns("x", "y")]
+    ball, robot = metres(table[["ball_x", "ball_y"]]), metres(table[["x", "y"]])
+    frames = []
+    for i, time in enumerate(table["time"]):
+        places = [f"{x} {y} 0" for x, y in (*(body[i] for body in bodies), ball[i])]
+        places.append(f"{robot[i][0]} {robot[i][1]} {headings[i]:.0f}")
+        line = f"{'L' if i else 'M'}{robot[i][0]} {robot[i][1]}"
+        frames.append([line, f"{time:.1f} s", " ".join(places), ""])
+    frames[-1][1] = _end(table)
+    return {"name": "", "colour": "currentColor", "wide": 2, "marked": False, "frames": frames}
+
+
+def _end(table: pd.DataFrame) -> str:
+    """Return how an episode ends."""
     taken, last = len(table) - 1, table.iloc[-1]
-    if taken > decisions:
-        return f"cut after {decisions} decisions"
     if last["outcome"] == "open":
         return f"ends after {taken} decisions"
     return f"{last['outcome']}: {last['time']:.1f} s, {taken} decisions"

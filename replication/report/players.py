@@ -1,251 +1,229 @@
 """Players of the agent while it learns: where it goes, its rewards, how far it is from the expert.
 
-Methods are shown side by side, with a frame for each iteration. One file because what a player
-shows of a trial (`Course`) and how that is drawn change together.
+Two runs stand side by side, without and with incorrect demonstrations, from the same seed. Which
+trial is shown follows from a rule: of all trials that one whose difference in iterations between
+the two is nearest to the median difference; of equally near ones the first. The quartiles can be
+looked at, too, by the same rule.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import cache
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.animation import FuncAnimation
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from replication.demos.model import Demos
-from replication.envs.maze import as_maze
-from replication.envs.soccer import rules
-from replication.envs.soccer.field import SoccerField
-from replication.envs.soccer.replay import replay
-from replication.evidence.experiments import Key
-from replication.irl import Trial, get_method
-from replication.report.maze import draw_map, map_numbers, places
-from replication.report.moving import DPI, Player, player
-from replication.report.pitch import draw_pitch
-from replication.report.readable import full_label
-from replication.report.style import legend_below, style
+from replication.evidence.experiments import NONE, Key
+from replication.irl import READINGS, Trial, get_method
+from replication.irl.expectations import visited
+from replication.report.moving import Player, key_entry, path, player_page
+from replication.report.readable import F_LABELS, SET_LABELS
+from replication.report.stages import EXPERT, Stage, stage
 
 Floats = NDArray[np.float64]
 
-FRAMES_A_SECOND = 3
-MOST_FRAMES = 120
-REWARD_MAP = "PiYG"
+PARTS = {"lower quartile": 0.25, "median": 0.5, "upper quartile": 0.75}
+"""Of the differences: what the trials that can be chosen are nearest to."""
+
+LEVELS = 9
+"""In so many steps a reward goes from hardly anything to the largest."""
+
+NAMES = {"unified": "Without incorrect", "unified-incorrect": "With incorrect"}
 
 
-@dataclass(frozen=True)
-class Course:
-    """One trial, iteration by iteration: entry i is what there is after i weight updates.
+def keys(reading: str, set: str) -> tuple[Key, Key]:
+    """Return what is compared under a reading: the method without, and with incorrect ones."""
+    without = get_method("unified").under(reading)
+    return ("unified", without, NONE), ("unified-incorrect", reading, set)
 
-    Attributes
+
+def differences(trials: pd.DataFrame, reading: str, set: str) -> pd.Series:
+    """Return how many iterations each trial saves with incorrect demonstrations, by its number."""
+    rows = trials.set_index(["method", "reading", "set", "trial"]).sort_index()
+    without, given = (rows.loc[key, "iterations"] for key in keys(reading, set))
+    return (without - given).dropna()
+
+
+def typical_trials(saved: pd.Series) -> dict[str, int]:
+    """Return the trial nearest to the median of the differences, and to each quartile.
+
+    Examples
+    --------
+    >>> typical_trials(pd.Series([3, -1, 8, 3, 4], index=[0, 1, 2, 3, 4]))
+    {'lower quartile': 0, 'median': 0, 'upper quartile': 4}
+    """
+    return {part: int((saved - saved.quantile(q)).abs().idxmin()) for part, q in PARTS.items()}
+
+
+def learning(
+    demos: Demos, trials: pd.DataFrame, replayed: Callable[[Key, int], Trial], *, set: str
+) -> Player:
+    """Return a player of typical trials, under each reading.
+
+    Parameters
     ----------
-    method, reading, set
-        What learned, under which reading of Eq. 9, and from which incorrect demonstrations.
-    errors
-        d (Eq. 6), [n + 1].
-    ways
-        Where the greedy agent goes, x and y of each step: n + 1 arrays [T + 1, 2].
-    weights
-        Reward weights of what is coloured, [n + 1, cell or pair].
+    demos
+        What the expert shows.
+    trials
+        The table of all trials, from which the typical ones are chosen.
+    replayed
+        Returns a trial, given by what it is of and its number, with its snapshots.
+    set
+        The set of incorrect demonstrations that is shown.
     """
+    place = stage(demos)
+    known = SET_LABELS.get(set, set)
+    readings = [one for one in READINGS if one in {*trials.loc[trials["set"] == set, "reading"]}]
 
-    method: str
-    reading: str
-    set: str
-    errors: Floats
-    ways: tuple[Floats, ...]
-    weights: Floats
+    @cache
+    def run(key: Key, k: int) -> tuple[pd.DataFrame, Floats]:
+        return _numbers(place, key, k, replayed(key, k))
 
-    @property
-    def label(self) -> str:
-        """How it is called."""
-        return full_label(self.method, self.reading, self.set)
-
-    @property
-    def iterations(self) -> int:
-        """Number of weight updates."""
-        return len(self.errors) - 1
-
-
-def courses(demos: Demos, trials: Mapping[Key, Trial]) -> list[Course]:
-    """Return the courses of trials that kept their snapshots, in a maze or on the soccer field."""
-    shown = []
-    for (method, reading, set), trial in trials.items():
-        assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
-        ways = tuple(_way(demos, episode.states, episode.actions) for episode in trial.episodes)
-        weights = _shown_weights(demos, trial.snapshots.weights)
-        shown.append(Course(method, reading, set, trial.errors, ways, weights))
-    return shown
-
-
-def learning_player(demos: Demos, shown: Sequence[Course]) -> Player:
-    """Return a player of some courses.
-
-    A method that has converged keeps its last frame until all have. Of very many iterations some
-    are left out, evenly.
-    """
-    ends = [
-        f"{course.label}: d = 0 after {course.iterations}"
-        if course.errors[-1] == 0
-        else f"{course.label}: d = {course.errors[-1]:.3g}"
-        for course in shown
-    ]
+    tables: list[pd.DataFrame] = []
+    plays: list[dict[str, object]] = []
+    medians: list[str] = []
+    for reading in readings:
+        saved = differences(trials, reading, set)
+        for part, k in typical_trials(saved).items():
+            runs = _with_rewards([run(key, k) for key in keys(reading, set)])
+            tables += [each.assign(under=reading, nearest_to=part) for each in runs]
+            text = _why(saved, part, k) + _outcome(runs, known)
+            plays.append({"text": text, "panels": _panels(runs, place.steps)})
+            if part == "median":
+                without, given = (len(each) - 1 for each in runs)
+                medians.append(f"{F_LABELS[reading]}: {without} without and {given} with")
+    content = {
+        "title": "The agent learning, without and with incorrect demonstrations",
+        "unit": "iteration",
+        "rate": 3,
+        "continuous": False,
+        "view": place.view,
+        "still": place.still,
+        "movers": ['<path class="dot" d="M0 0h0"/>'],
+        "marks": {**place.marks, "levels": LEVELS, "marked": _marked(place, demos.select(set))},
+        "chart": "error d (square-root scale) after each iteration",
+        "key": _key(place),
+        "choices": [
+            {"name": "Reading", "options": [F_LABELS[one] for one in readings], "start": 0},
+            {"name": "Trial", "options": [*PARTS], "start": [*PARTS].index("median")},
+        ],
+        "plays": plays,
+    }
     words = (
-        "The agent's way, its reward weights and its error, iteration by iteration, one trial of "
-        f"each method side by side. Iterations to the end: {'; '.join(ends)}."
+        "The agent's way, its reward weights and its error, iteration by iteration, without and "
+        f"with incorrect demonstrations ({known}) side by side. Iterations of the trial whose "
+        f"difference is nearest to the median: {'; '.join(medians)}."
     )
-    html = player(_animation(demos, shown), words, frames_a_second=FRAMES_A_SECOND)
-    return Player(html, pd.concat(map(_numbers, shown), ignore_index=True), words)
+    numbers = pd.concat(tables, ignore_index=True)
+    first = ["under", "nearest_to"]
+    return Player(player_page(content, words), numbers[[*first, *numbers.columns[:-2]]], words)
 
 
-def _numbers(course: Course) -> pd.DataFrame:
-    """Return a row for each iteration."""
-    return pd.DataFrame(
+def _numbers(place: Stage, key: Key, k: int, trial: Trial) -> tuple[pd.DataFrame, Floats]:
+    """Return what the player draws of a trial, a row for each iteration; and all weights."""
+    assert trial.snapshots is not None, "a player needs trials that kept their snapshots"
+    ways = [place.points(episode.states, episode.actions) for episode in trial.episodes]
+    table = pd.DataFrame(
         {
-            "method": course.method,
-            "reading": course.reading,
-            "set": course.set,
-            "iteration": range(course.iterations + 1),
-            "error": course.errors,
-            "moves": [len(way) - 1 for way in course.ways],
-            "last_x": [way[-1, 0] for way in course.ways],
-            "last_y": [way[-1, 1] for way in course.ways],
-            "lowest_weight": course.weights.min(axis=1),
-            "highest_weight": course.weights.max(axis=1),
+            **dict(zip(("method", "reading", "set"), key, strict=True)),
+            "trial": k,
+            "iteration": range(trial.iterations + 1),
+            "error": trial.errors,
+            "moves": [len(way) - 1 for way in ways],
+            "way": [path(way) for way in ways],
+            "end": [f"{x} {y}" for x, y in (way[-1] for way in ways)],
         }
     )
+    return table, place.weights(trial.snapshots.weights)
 
 
-def _animation(demos: Demos, shown: Sequence[Course]) -> FuncAnimation:
-    with style():
-        figure = Figure(figsize=(2.75 * len(shown) + 0.5, 4.35), dpi=DPI, layout="constrained")
-        _Canvas(figure)
-        grid = figure.subplots(2, len(shown), height_ratios=(3, 1), squeeze=False)
-        # Colours show the root of a weight's size: one wrong loop outweighs all that is learned.
-        most = np.sqrt(max(np.abs(course.weights).max() for course in shown)) or 1.0
-        norm = Normalize(-most, most)
-        panels = [_Panel(demos, course, norm, *grid[:, at]) for at, course in enumerate(shown)]
-        longest = max(course.iterations for course in shown)
-        highest = max(course.errors.max() for course in shown)
-        for curve in grid[1]:
-            curve.set(xlim=(0, longest), ylim=(0, highest * 1.05), xlabel="iteration")
-            curve.label_outer()
-        grid[1, 0].set_ylabel("error d")
-        colours = ScalarMappable(norm, REWARD_MAP)
-        bar = figure.colorbar(colours, ax=grid[0].tolist(), shrink=0.8, pad=0.01)
-        bar.set_ticks([-most, 0, most], labels=["avoid", "0", "seek"])
-        bar.set_label("reward weight (√ of its size)", labelpad=-2)
-        handles = [
-            Line2D([], [], color="0.1", label="the agent's way", lw=1.6),
-            Line2D([], [], color="0.1", marker="o", ms=4, lw=0, label="where it ends"),
-            Line2D([], [], color="0.45", ls=":", lw=1.4, label="the expert's way"),
-        ]
-        legend_below(figure, handles)
-
-        def draw(frame: int) -> list[Any]:
-            for panel in panels:
-                panel.draw(frame)
-            return []
-
-        draw(longest)
-        for _ in range(2):  # the first layout does not know yet how high the titles stand
-            figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        frames = np.linspace(0, longest, min(longest + 1, MOST_FRAMES)).round().astype(int)
-        return FuncAnimation(figure, draw, frames=frames, cache_frame_data=False)
+def _marked(place: Stage, demos: Demos) -> list[int]:
+    """Return the places that an incorrect demonstration visits, and no correct one."""
+    environment = demos.environment
+    shape = environment.n_states, environment.n_actions
+    wrong, right = (visited(one, shape=shape) for one in (demos.incorrect, demos.correct))
+    return np.flatnonzero(place.weights((wrong & ~right)[None].astype(float))).tolist()
 
 
-class _Canvas(FigureCanvasAgg):
-    """Draws a frame when it is saved, and not once more before."""
-
-    def draw_idle(self, *_: Any, **__: Any) -> None:
-        """Draw nothing."""
-
-
-class _Panel:
-    """One method in a player: the map above, the error below."""
-
-    def __init__(
-        self, demos: Demos, course: Course, norm: Normalize, above: Axes, below: Axes
-    ) -> None:
-        self.course = course
-        self.above = above
-        corners = _backdrop(demos, above)
-        self.coloured = np.flatnonzero(course.weights.any(axis=0))
-        shapes = list(corners[self.coloured])
-        self.rewards = PolyCollection(shapes, cmap=REWARD_MAP, norm=norm, lw=0, zorder=1)
-        above.add_collection(self.rewards, autolim=False)
-        expert = _way(demos, demos.correct[0].states, demos.correct[0].actions)
-        above.plot(*expert.T, color="0.45", ls=":", lw=1.4, zorder=4)
-        (self.way,) = above.plot([], [], color="0.1", lw=1.6, solid_capstyle="round", zorder=6)
-        (self.end,) = above.plot([], [], "o", color="0.1", ms=4, zorder=6)
-        colour = get_method(course.method).colour
-        below.plot(course.errors, color=colour, lw=0.8, alpha=0.35)
-        (self.error,) = below.plot([], [], color=colour, lw=1.4)
-        (self.now,) = below.plot([], [], "o", color=colour, ms=4, clip_on=False)
-
-    def draw(self, frame: int) -> None:
-        """Show the state after so many iterations, or the last one."""
-        course, i = self.course, min(frame, self.course.iterations)
-        weights = course.weights[i, self.coloured]
-        self.rewards.set_array(np.sign(weights) * np.sqrt(np.abs(weights)))
-        self.way.set_data(*course.ways[i].T)
-        self.end.set_data(*course.ways[i][-1:].T)
-        self.error.set_data(np.arange(i + 1), course.errors[: i + 1])
-        self.now.set_data([i], [course.errors[i]])
-        status = f"iteration {i}: {len(course.ways[i]) - 1} moves, d = {course.errors[i]:.2f}"
-        if i == course.iterations:
-            status = f"ends after {i} iterations, d = {course.errors[i]:.3g}"
-        self.above.set_title(f"{course.label}\n{status}", loc="left", fontsize=8)
+def _with_rewards(runs: list[tuple[pd.DataFrame, Floats]]) -> list[pd.DataFrame]:
+    """Return runs with their rewards, on one scale."""
+    most = max(np.abs(weights).max() for _, weights in runs) or 1.0
+    return [table.assign(rewards=_changes(weights, most)) for table, weights in runs]
 
 
-def _backdrop(demos: Demos, panel: Axes) -> Floats:
-    """Draw where the agent moves; return the corners of what rewards colour, [shape, corner, 2]."""
-    if isinstance(demos.environment, SoccerField):
-        draw_pitch(panel)
-        panel.set(xticks=[], yticks=[])
-        x = np.linspace(0, rules.WIDTH, rules.COLUMNS + 1)
-        y = np.linspace(0, rules.HEIGHT, rules.ROWS + 1)
-        left, low = (side.ravel() for side in np.meshgrid(x[:-1], y[:-1], indexing="ij"))
-        right, high = (side.ravel() for side in np.meshgrid(x[1:], y[1:], indexing="ij"))
-        corners = [(left, low), (right, low), (right, high), (left, high)]
-        return np.stack([np.stack(corner, axis=1) for corner in corners], axis=1)
-    maze = as_maze(demos.environment)
-    draw_map(panel, map_numbers(maze), grid=False)
-    panel.set(xticks=[], yticks=[], xlabel="", ylabel="", anchor="N")
-    centre = np.stack(places(maze, np.arange(maze.n_states)), axis=1)
-    # A cell's four triangles are its actions: up, down, right, left.
-    sides = 0.5 * np.array(
-        [((-1, 1), (1, 1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1)), ((-1, -1), (-1, 1))]
-    )
-    shapes = np.zeros((maze.n_states, maze.n_actions, 3, 2)) + centre[:, None, None]
-    shapes[:, :, 1:] += sides
-    return shapes.reshape(-1, 3, 2)
+def _changes(weights: Floats, most: float) -> list[str]:
+    """Return which places change their level in each iteration, and to what.
 
-
-def _way(demos: Demos, states: NDArray[np.int64], actions: NDArray[np.int64]) -> Floats:
-    """Return where an episode leads, x and y [T + 1, 2]."""
-    if isinstance(demos.environment, SoccerField):
-        return replay(demos.environment, actions)[["x", "y"]].to_numpy()
-    return np.stack(places(as_maze(demos.environment), states), axis=1).astype(float)
-
-
-def _shown_weights(demos: Demos, weights: Floats) -> Floats:
-    """Return what is coloured: the weight of each pair in a maze, of each cell in soccer.
-
-    Actions in soccer have no side of the cell: a cell shows its weight of greatest size.
+    Levels go by the root of a weight's size: one wrong loop outweighs all that is learned.
     """
-    if not isinstance(demos.environment, SoccerField):
-        return weights.reshape(len(weights), -1)
-    cells = weights.reshape(len(weights), rules.COLUMNS * rules.ROWS, -1)
-    greatest = np.abs(cells).argmax(axis=2)
-    return np.take_along_axis(cells, greatest[..., None], axis=2)[..., 0]
+    levels = (np.sign(weights) * np.ceil(LEVELS * np.sqrt(np.abs(weights) / most))).astype(int)
+    before = np.vstack([np.zeros_like(levels[:1]), levels[:-1]])
+    return [
+        " ".join(f"{at}:{new[at]}" for at in np.flatnonzero(new != old))
+        for old, new in zip(before, levels, strict=True)
+    ]
+
+
+def _panels(runs: list[pd.DataFrame], steps: str) -> list[dict[str, object]]:
+    """Return both sides of a player; None stands for a frame that is as on the first side."""
+    first, second = (_panel(run, steps) for run in runs)
+    pairs = zip_longest(first["frames"], second["frames"])
+    same = [one == other for one, other in pairs]
+    second["frames"] = [
+        None if equal else frame for equal, frame in zip(same, second["frames"], strict=False)
+    ]
+    return [first, second]
+
+
+def _panel(run: pd.DataFrame, steps: str) -> dict[str, Any]:
+    """Return one side of a player."""
+    method = get_method(run["method"].iloc[0])
+    frames = [
+        [row.way, f"d = {row.error:.3g}, {row.moves} {steps}", f"{row.end} 0", row.rewards]
+        for row in run.itertuples()
+    ]
+    frames[-1][1] = f"d = {run['error'].iloc[-1]:.3g} after {len(run) - 1} iterations"
+    return {
+        "name": NAMES[method.name],
+        "colour": method.colour,
+        "wide": 2 if method.uses_incorrect else 4.5,  # so both are seen where they are one
+        "marked": method.uses_incorrect,
+        "frames": frames,
+        "errors": [float(f"{error:.4g}") for error in run["error"]],
+    }
+
+
+def _why(saved: pd.Series, part: str, k: int) -> str:
+    """Return why a trial is shown, as a sentence."""
+    nearest = f"nearest to the {part}, {saved.quantile(PARTS[part]):g}"
+    return f"Trial {k}, the first of {len(saved)} that saves a number of iterations {nearest}. "
+
+
+def _outcome(runs: list[pd.DataFrame], known: str) -> str:
+    """Return what comes out, as a sentence."""
+    without, given = (len(run) - 1 for run in runs)
+    drawn = ["error", "way", "rewards"]
+    same = runs[0][drawn].equals(runs[1][drawn])
+    return (
+        f"It takes {without} iterations without incorrect demonstrations and {given} with them "
+        f"({known}){'; the two runs are the same, move by move' if same else ''}."
+    )
+
+
+def _key(place: Stage) -> str:
+    """Return what everything means, as HTML."""
+    seek, avoid, marked = place.marks["shapes"]
+    line = '<path class="way" d="M-11 0H9"/><path class="dot" d="M9 0h0"/>'
+    entries = [
+        ("-12 -8 24 16", line, "the agent\u2019s way, and where it ends"),
+        ("-12 -8 24 16", EXPERT, "the expert\u2019s way"),
+        (place.close, f'<path class="seek" d="{seek}"/>', "rewarded"),
+        (place.close, f'<path class="avoid" d="{avoid}"/>', "punished; the fuller, the more"),
+        (place.close, f'<path class="marked" d="{marked}"/>', "in an incorrect demonstration only"),
+    ]
+    return "".join(key_entry(*entry) for entry in entries)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 
@@ -15,6 +16,7 @@ from replication.evidence import experiments, tables
 from replication.evidence.experiments import EXPERIMENTS, Key
 from replication.files import parse_json, resolve
 from replication.irl import Trial
+from replication.learning.seeds import child
 from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
 from replication.report.outputs import Outputs
 from replication.report.readable import markdown
@@ -126,6 +128,11 @@ class Study(Outputs):
             key: results.trial(condition, TRACED_TRIAL, snapshots=True)
             for key, condition in shown.items()
         }
+
+    def replayed(self, key: Key, k: int) -> Trial:
+        """Return trial `k` of a condition with all that happened in it, computed again."""
+        seed = child(np.random.SeedSequence(self.settings["seed"]), k)
+        return self.conditions[key].trial(seed=seed, keep=True)
 
     def show(self, table: pd.DataFrame) -> Markdown:
         """Show a table that is not written."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -187,33 +188,55 @@ def test_every_figure_is_traced(site: Path) -> None:
 
 # --- the players -----------------------------------------------------------------------------
 
+SEEN = (
+    "player => [...player.querySelectorAll('.panels svg')].map(one => one.innerHTML +"
+    " one.getAttribute('aria-label')).join()"
+)
+"""What the panels of a player show."""
 
-def open_player(open_page: Open, name: str) -> tuple[Page, Locator, Locator, Locator]:
-    """Open a page with a player; return the page, the player, its picture and its slider."""
-    page = open_page(name)
-    player = page.locator(".animation").first
-    return page, player, player.locator("img"), player.locator("input[type=range]")
+
+def open_player(open_page: Open, name: str, **options: Any) -> tuple[Page, Locator, Locator]:
+    """Open a page with a player; return the page, the player and its slider."""
+    page = open_page(name, **options)
+    player = page.locator(".replay").first
+    return page, player, player.locator("input[type=range]")
+
+
+def press(player: Locator, button: str, *, tap: bool = False) -> None:
+    """Press a button of a player."""
+    found = player.get_by_role("button", name=button, exact=True)
+    if tap:
+        found.tap()
+    else:
+        found.click()
+
+
+def wait_for(slider: Locator, condition: str) -> None:
+    """Wait until the value of a slider meets a condition."""
+    slider.page.wait_for_function(
+        f"slider => slider.value {condition}", arg=slider.element_handle()
+    )
 
 
 @pytest.mark.parametrize("name", PLAYERS)
-def test_a_player_works_by_mouse(open_page: Open, name: str) -> None:
-    """Next, last, first, play and pause do what they say, and the picture changes with them."""
-    page, player, picture, slider = open_player(open_page, name)
-
-    def press(button: str) -> None:
-        player.get_by_role("button", name=button, exact=True).click()
-
-    first = picture.get_attribute("src")
-    press("Next frame")
+@pytest.mark.parametrize("by", ["mouse", "touch"])
+def test_a_player_works_by_pointer(open_page: Open, name: str, by: str) -> None:
+    """First, next, last, play and pause do what they say, and the picture changes with them."""
+    touch = by == "touch"
+    options: dict[str, Any] = {"size": NARROW, "has_touch": True} if touch else {}
+    page, player, slider = open_player(open_page, name, **options)
+    press(player, "First frame", tap=touch)
+    first = player.evaluate(SEEN)
+    press(player, "Next frame", tap=touch)
     assert slider.input_value() == "1"
-    assert picture.get_attribute("src") != first
-    press("Last frame")
+    assert player.evaluate(SEEN) != first
+    press(player, "Last frame", tap=touch)
     assert slider.input_value() == slider.get_attribute("max")
-    press("First frame")
-    assert picture.get_attribute("src") == first
-    press("Play")
-    page.wait_for_function("slider => slider.value >= 2", arg=slider.element_handle())
-    press("Pause")
+    press(player, "First frame", tap=touch)
+    assert player.evaluate(SEEN) == first
+    press(player, "Play", tap=touch)
+    wait_for(slider, ">= 2")
+    press(player, "Pause", tap=touch)
     stopped = slider.input_value()
     page.wait_for_timeout(800)
     assert slider.input_value() == stopped
@@ -221,28 +244,142 @@ def test_a_player_works_by_mouse(open_page: Open, name: str) -> None:
 
 @pytest.mark.parametrize("name", PLAYERS)
 def test_a_player_works_by_keyboard(open_page: Open, name: str) -> None:
-    """The arrow keys step on the slider, and the space bar presses a button that has the focus."""
-    page, player, picture, slider = open_player(open_page, name)
+    """Arrow keys, Home and End step; the space bar plays and pauses, and does not scroll."""
+    page, player, slider = open_player(open_page, name)
     slider.focus()
-    first = picture.get_attribute("src")
+    page.keyboard.press("Home")
+    first = player.evaluate(SEEN)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert slider.input_value() == "2"
-    assert picture.get_attribute("src") != first
+    assert player.evaluate(SEEN) != first
+    page.keyboard.press("ArrowLeft")
+    assert slider.input_value() == "1"
+    page.keyboard.press("End")
+    assert slider.input_value() == slider.get_attribute("max")
     page.keyboard.press("Home")
-    assert picture.get_attribute("src") == first
-    player.get_by_role("button", name="Play", exact=True).focus()
-    page.keyboard.press("Space")
-    page.wait_for_function("slider => slider.value >= 2", arg=slider.element_handle())
+    assert player.evaluate(SEEN) == first
+    for focus in (slider, player):
+        focus.focus()
+        page.keyboard.press("Home")
+        before = page.evaluate("scrollY")
+        page.keyboard.press("Space")
+        wait_for(slider, ">= 1")
+        page.keyboard.press("Space")
+        assert player.get_by_role("button", name="Play", exact=True).count() == 1
+        assert page.evaluate("scrollY") == before
 
 
-def test_players_show_the_methods_side_by_side(open_page: Open) -> None:
-    """The words of a player name each method and how many iterations it takes."""
-    text = open_page("notebooks/open_maze").locator(".animation img").first.get_attribute("alt")
-    assert text is not None
-    assert "side by side" in text
-    for method in ("AdaBoost-IRL (R1)", "without incorrect", "with incorrect"):
-        assert method in text
+def test_playing_again_begins_at_the_start(open_page: Open) -> None:
+    """A player waits until it is asked to play, stops at the end, and then plays from the start."""
+    page, player, slider = open_player(open_page, "notebooks/soccer")
+    page.wait_for_timeout(800)
+    last = slider.get_attribute("max")
+    assert slider.input_value() == last
+    press(player, "Play")
+    wait_for(slider, "<= 3")
+    player.get_by_role("button", name="Play", exact=True).wait_for()
+    assert slider.input_value() == last
+    press(player, "Play")
+    wait_for(slider, "<= 3")
+    assert player.get_by_role("button", name="Pause", exact=True).count() == 1
+
+
+def test_what_a_slider_shows_is_spoken(open_page: Open) -> None:
+    """The slider says iteration and error of both sides, and each panel its own."""
+    page, player, slider = open_player(open_page, "notebooks/open_maze")
+    slider.focus()
+    page.keyboard.press("Home")
+    for _ in range(7):
+        page.keyboard.press("ArrowRight")
+    spoken = slider.get_attribute("aria-valuetext") or ""
+    side = r"incorrect: d = [\d.]+, \d+ moves"
+    assert re.fullmatch(f"iteration 7, Without {side}; With {side}", spoken)
+    for panel in player.locator(".panels svg").all():
+        assert (panel.get_attribute("aria-label") or "nothing") in spoken
+
+
+@pytest.mark.parametrize("name", PLAYERS)
+def test_readings_and_trials_can_be_chosen(open_page: Open, name: str) -> None:
+    """Each reading and trial says which trial it is; in most the two sides end differently."""
+    _, player, _ = open_player(open_page, name)
+    readings, parts = player.locator("fieldset").all()
+    seen, differ = set(), 0
+    for reading in readings.get_by_role("radio").all():
+        reading.check()
+        for part in parts.get_by_role("radio").all():
+            part.check()
+            seen.add(player.locator("p").inner_text())
+            one, other = player.locator(".status").all_inner_texts()
+            differ += one != other
+    assert len(seen) == 9
+    assert differ > 4
+
+
+def test_a_point_of_the_curve_can_be_chosen(open_page: Open) -> None:
+    """A click on the curve of errors goes to the iteration there."""
+    _, player, slider = open_player(open_page, "notebooks/open_maze")
+    chart = player.locator(".chart")
+    box = chart.bounding_box()
+    assert box is not None
+    chart.click(position={"x": box["width"] / 2, "y": 20})
+    middle = int(slider.get_attribute("max") or 0) / 2
+    assert abs(int(slider.input_value()) - middle) <= 1
+
+
+def test_a_film_lets_an_episode_be_chosen(open_page: Open) -> None:
+    """The film has an option for each episode, and each is as long as it is."""
+    film = open_page("notebooks/soccer").locator(".replay").nth(1)
+    slider = film.locator("input[type=range]")
+    lengths = set()
+    for option in film.get_by_role("radio").all():
+        option.check()
+        press(film, "Last frame")
+        lengths.add(slider.get_attribute("max"))
+        spoken = slider.get_attribute("aria-valuetext") or ""
+        assert re.match(r"decision \d+, .*decisions$", spoken)
+    assert len(lengths) == 3
+
+
+@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
+def test_nothing_glides_for_whoever_asks_for_less_motion(open_page: Open, motion: str) -> None:
+    """While a film plays its robots glide, unless the reader's system asks for less motion."""
+    film = open_page("notebooks/soccer", reduced_motion=motion).locator(".replay").nth(1)
+    press(film, "Play")
+    glide = film.locator(".mover").first.evaluate("one => getComputedStyle(one).transitionDuration")
+    assert (glide == "0s") == (motion == "reduce")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_players_work_as_files_and_several_on_a_page(
+    browser: Browser, tmp_path: Path, scheme: str
+) -> None:
+    """A player opens from disk in the reader's colours; copies on one page do not clash."""
+    page = browser.new_page(viewport=NARROW, color_scheme=scheme)  # type: ignore[arg-type]
+    faults: list[str] = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    figures = PROJECT / "figures"
+    files = [figures / name / "player.html" for name in ("open_maze", "obstacle_maze", "soccer")]
+    files.append(figures / "soccer" / "film.html")
+    for file in files:
+        assert file.stat().st_size < 200_000
+        page.goto(file.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
+        ink = page.evaluate("getComputedStyle(document.querySelector('.replay')).color")
+        assert ink == {"light": "rgb(0, 0, 0)", "dark": "rgb(255, 255, 255)"}[scheme]
+    text = "".join(file.read_text(encoding="utf-8") for file in (*files, files[0]))
+    together = tmp_path / "together.html"
+    together.write_text(f"<!doctype html><title>several</title><body>{text}", encoding="utf-8")
+    page.goto(together.as_uri())
+    players = page.locator(".replay").all()
+    sliders = [player.locator("input[type=range]") for player in players]
+    assert len(players) == sum(slider.count() for slider in sliders) == 5
+    players[0].get_by_role("radio").nth(2).check()
+    assert players[4].get_by_role("radio").nth(0).is_checked()
+    press(players[0], "First frame")
+    assert [slider.input_value() == "0" for slider in sliders] == [True, *[False] * 4]
+    page.close()
+    assert faults == []
 
 
 # --- tables ----------------------------------------------------------------------------------
@@ -311,7 +448,7 @@ def test_pages_can_be_printed(open_page: Open) -> None:
     page = open_page("notebooks/open_maze")
     assert len(page.pdf()) > 100_000
     page.emulate_media(media="print")
-    assert not page.locator(".anim-controls").first.is_visible()
+    assert not page.locator(".replay .controls").first.is_visible()
 
 
 def test_no_server_is_needed(site: Path) -> None:

@@ -296,7 +296,7 @@ FORGERIES: dict[str, tuple[Any, ...]] = {
         "claims/verdicts.svg has other bytes",
     ),
     "player": ("soccer", content("out/soccer/player.html", flipped), "player.html is changed"),
-    "film": ("soccer", content("out/soccer/film.gif", flipped), "soccer/film.gif is changed"),
+    "film": ("soccer", content("out/soccer/film.csv", flipped), "soccer/film.csv is changed"),
     "figure": (MAZE, figure_redrawn, "fig09.csv has other", "fig09.png has other"),
     "table": (MAZE, table_everywhere, "table2.csv has other", SHOWN),
     "verdict": ("claims", verdict_everywhere, "verdicts.csv has other", "verdicts.png has other"),

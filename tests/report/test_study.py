@@ -14,6 +14,7 @@ from replication.paper.published import FIGURE_5, TABLE_1
 from replication.paper.register import ChoiceError
 from replication.report.study import Study
 from replication.trials.measures import ALONG
+from replication.trials.results import digest
 
 FEW = {"episodes": 60, "horizon": 40}
 
@@ -101,6 +102,16 @@ def test_traced_trials_are_those_of_a_cell(
     traced = study.traced(reading, set)
     assert list(traced) == [("adaboost", "", NONE), *shown]
     assert all(trial.snapshots is not None for trial in traced.values())
+
+
+def test_a_trial_is_replayed_with_its_snapshots(study: Study) -> None:
+    """A trial that is computed again is that of the table, and keeps every iteration."""
+    key = "unified-incorrect", "at-once", GENERAL
+    trial = study.replayed(key, 2)
+    rows = study.trials.set_index(["method", "reading", "set", "trial"])
+    assert digest(trial) == rows.loc[(*key, 2), "digest"]
+    assert trial.snapshots is not None
+    assert len(trial.snapshots.weights) == trial.iterations + 1
 
 
 def test_rows_of_methods(study: Study) -> None:
