@@ -59,7 +59,9 @@ def draw_points(numbers: pd.DataFrame) -> Figure:
             panel.plot(row.mean, row.sd, mark, ms=4.5, mec=colour, mfc=face, mew=1.2)
         for row in numbers[own & judged].itertuples():
             _cross(panel, row, VERMILION, lw=1.8, zorder=4)
-            panel.plot(row.mean, row.sd, "o", ms=4.5, color=VERMILION, zorder=5)
+            face = VERMILION if row.fits else "w"
+            style = {"color": VERMILION, "mfc": face, "mew": 1.4, "zorder": 5}
+            panel.plot(row.mean, row.sd, STARTS[row.start], ms=5, **style)
         mean, sd = numbers[["paper_mean", "paper_sd"]].iloc[0]
         panel.plot(mean, sd, "*", ms=14, mfc="none", mec=INK, mew=1.3, zorder=6)
         panel.set_title(f"({letter}) {F_LABELS[trace]}", loc="left")
@@ -79,8 +81,9 @@ def _handles(final: pd.DataFrame, judged: pd.DataFrame, mean: float, sd: float) 
     rates = [handle(f"α = {rate:g}", "", colour, lw=3) for rate, colour in RATES.items()]
     starts = [handle(f"F₀ = {f:g}", mark, "0.3", mfc="w", lw=0) for f, mark in STARTS.items()]
     rest = [handle("hollow: does not fit", "o", "0.3", mfc="w", lw=0)]
-    if len(judged):
-        rest.append(handle(f"judging run ({judged['n'].max()} trials)", "o", VERMILION, lw=1.8))
+    for row in judged.head(1).itertuples():
+        name = f"judging run, α = {row.alpha:g} ({row.n} trials)"
+        rest.append(handle(name, STARTS[row.start], VERMILION, mfc="w", lw=1.8))
     star = f"published ({mean:.2f}, {sd:.2f})"
     rest.append(handle(star, "*", INK, ms=10, mfc="none", lw=0))
     rest.append(handle(f"95 % intervals, {final['n'].max()} trials", "+", "0.5", ms=9, lw=0))

@@ -104,7 +104,9 @@ def draw_profile(numbers: pd.DataFrame) -> Figure:
         panel.bar(x, 100 * rounded, width=0.9, color=VERMILION)
         panel.bar(x, 100 * tied, width=0.9, bottom=100 * rounded, color="0.75")
         panel.set_title(f"({letter}) {_short_label(method, reading)}", size=8, loc="left")
-        panel.annotate(f"{rows['tables'].iloc[0]} Q-tables", (0.03, 0.9), xycoords="axes fraction")
+        panel.annotate(
+            f"{rows['tables'].iloc[0]} Q-tables", (0.03, 0.9), xycoords="axes fraction", size=7.5
+        )
         panel.set_xlabel("step of the expert's path", size=8)
         panel.set_xlim(-0.6, x[-1] + 0.6)
     axes[0].set_ylabel("share of Q-tables (%)", size=8)

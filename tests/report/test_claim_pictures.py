@@ -528,7 +528,7 @@ def test_the_judging_run_stands_beside_the_finalists() -> None:
         assert level[:, 0].tolist() == row[["low", "high"]].tolist()
         assert upright[:, 1].tolist() == row[["sd_low", "sd_high"]].tolist()
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "judging run (1000 trials)" in labels
+    assert f"judging run, α = {JUDGED['ALPHA'].iloc[0]} (1000 trials)" in labels
     assert "and the judging run 36.0" in PICTURES["points"].words
 
 
