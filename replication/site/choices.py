@@ -50,7 +50,7 @@ def _matter(shares: pd.DataFrame) -> str:
             f"{short_label(row.claim)} ({row.share:.0%})"
             for row in part.sort_values("share", ascending=False).itertuples()
         ]
-        name = f"[{NAMES[id][0].upper()}{NAMES[id][1:]}](#choice-{PLACES.get(id, id).lower()})"
+        name = f"[{NAMES[id]}](#choice-{PLACES.get(id, id).lower()})"
         rows.append({"Choice": name, "What hangs on it (share of the variance)": ", ".join(on)})
     small = ", ".join(NAMES[id] for id in most[most < MATTERS].index)
     rest = f"\nNo claim hangs by {MATTERS:.0%} or more on {small}.\n" if small else ""

@@ -23,6 +23,7 @@ from replication import files
 from replication.files import read_file, write_file
 
 NUMBER = re.compile(r"[×≥~<]?\s*([-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)")
+BRACKETS = re.compile(r"\[[^\]]*\]")
 WORD = re.compile(r"[^\W\d_]{2}")
 
 HOLDS = "Holds with other choices"
@@ -46,18 +47,22 @@ def _skip_fields(
     return True if type(value).__name__ == "_tuplegetter" else None
 
 
+CODE = "code/"
+"""Where the package's code lies in the site."""
+
+
 # --- code ------------------------------------------------------------------------------------
 
 
 def source_of(domain: str, info: Mapping[str, str]) -> str | None:
-    """Return the address of an object's code, as pages of the reference see it."""
+    """Return the address of an object's code, as the first page sees it."""
     module = files.PROJECT / info["module"].replace(".", "/")
     path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
     if domain != "py" or not path.exists():
         return None
     name = info["fullname"].rpartition(".")[2]
     at = f"text=def%20{quote(name)}&text=class%20{quote(name)}"  # browsers scroll to the first
-    return f"../../code/{path.relative_to(files.PROJECT).as_posix()}.txt#:~:{at}"
+    return f"{CODE}{path.relative_to(files.PROJECT).as_posix()}.txt#:~:{at}"
 
 
 def _write_code(app: Sphinx, error: Exception | None) -> None:
@@ -104,11 +109,11 @@ def _finish(
     """Improve the tables of a page, and say what it shows to those who get a link to it."""
     if doctree is None:
         return
-    if "<table" in context.get("body", ""):
-        context["body"] = improve_tables(context["body"])
-    first = next(iter(doctree.findall(nodes.paragraph)), None)
-    if first is not None:
-        context["description"] = textwrap.shorten(first.astext(), 200, placeholder=" …")
+    body = context["body"].replace(f'href="{CODE}', f'href="{context["content_root"]}{CODE}')
+    context["body"] = improve_tables(body) if "<table" in body else body
+    texts = (paragraph.astext() for paragraph in doctree.findall(nodes.paragraph))
+    first = next((text for text in texts if len(text) > 40), context.get("title", ""))
+    context["description"] = textwrap.shorten(first, 200, placeholder=" …")
     pictures = [image["uri"] for image in doctree.findall(nodes.image)]
     shown = [app.builder.images[uri] for uri in pictures if uri in app.builder.images]
     if shown:
@@ -189,6 +194,8 @@ def _add_keys(rows: list[list[Tag]]) -> None:
         if not any(WORD.search(text) for text in texts):
             for cell in (head, *column):
                 cell["class"] = [*cell.get_attribute_list("class", []), "number"]
+                for text in cell.find_all(string=BRACKETS):
+                    text.replace_with(BRACKETS.sub(lambda part: part[0].replace(" ", "\xa0"), text))
 
 
 def _add_bars(soup: BeautifulSoup, rows: list[list[Tag]]) -> bool:

@@ -43,6 +43,7 @@ def test_choices_stand_by_kind() -> None:
 def test_what_matters_comes_first() -> None:
     """The table has the choices with a large share, largest first, in words; noise is none."""
     table, _, rest = choices(SHARES).partition("\n\n")
+    assert "| [α](#choice-alpha) |" in re.sub(" +", " ", table)
     names = [line.split("|")[1].strip() for line in table.splitlines()[2:]]
     assert [name.partition("]")[2] for name in names] == ["(#choice-map-open)", "(#choice-alpha)"]
     assert "faster than AdaBoost-IRL (50%), saves iterations (20%)" in table

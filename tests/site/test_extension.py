@@ -64,6 +64,13 @@ def test_numbers_are_aligned() -> None:
         assert kinds == [True, False, False]
 
 
+def test_intervals_are_not_broken() -> None:
+    """A line may end before an interval, not in it; the file has plain spaces."""
+    page = improved(("n", "m [95 %]"), ("1", "1.50 [1, 2]"), ("2", "–"))
+    assert page.tbody.find_all("td")[1].get_text() == "1.50 [1,\xa02]"
+    assert "1.50 [1, 2]" in unquote(page.find("a", class_="table-csv")["href"])
+
+
 def test_what_holds_has_a_bar() -> None:
     """The share of specifications is drawn to scale, and cells know the head of their column."""
     rows = (("a", "12 of 48: fragile"), ("b", "not tested"))
@@ -81,10 +88,10 @@ def test_the_code_of_an_object_is_a_file() -> None:
     """An address leads to the module's text and to the object; what is not ours has none."""
     info = {"module": "replication.site.extension", "fullname": "formula"}
     assert source_of("py", info) == (
-        "../../code/replication/site/extension.py.txt#:~:text=def%20formula&text=class%20formula"
+        "code/replication/site/extension.py.txt#:~:text=def%20formula&text=class%20formula"
     )
     package = source_of("py", {"module": "replication.site", "fullname": "x"}) or ""
-    assert package.startswith("../../code/replication/site/__init__.py.txt#")
+    assert package.startswith("code/replication/site/__init__.py.txt#")
     assert source_of("py", {"module": "numpy", "fullname": "array"}) is None
 
 
