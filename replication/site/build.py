@@ -24,7 +24,7 @@ from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
 from replication.report.findings import held
 from replication.report.outputs import TRIALS
-from replication.site import overview
+from replication.site import extension, overview
 from replication.site.choices import choices
 from replication.site.findings import render_findings
 from replication.site.pages import Origin, link_pages, page
@@ -195,12 +195,13 @@ def _write(work: Path) -> None:
 
 
 def _outline(source: Path) -> str:
-    """Return the titles of the pages and their order, and the modules that have pages."""
+    """Return what is in all pages: titles, their order, modules, and what our extension adds."""
     part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
     pages = (read_text(path) for path in sorted(source.glob("*.md")))
     titles = [title for text in pages for title in part.findall(text)]
     modules = sorted((files.PROJECT / "replication").rglob("*.py"))
-    return "\n".join([*titles, *(path.as_posix() for path in modules)])
+    code = read_text(Path(extension.__file__))  # what it makes of a page is in no source
+    return "\n".join([*titles, *(path.as_posix() for path in modules), code])
 
 
 def _replace(new: Path, site: Path) -> None:

@@ -23,7 +23,7 @@ from replication import files
 from replication.files import read_file, write_file
 
 NUMBER = re.compile(r"[×≥~<]?\s*([-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)")
-BRACKETS = re.compile(r"\[[^\]]*\]")
+TOGETHER = re.compile(r"\[[^\]]*\]|[×≥~<] (?=\d)")
 WORD = re.compile(r"[^\W\d_]{2}")
 
 HOLDS = "Holds with other choices"
@@ -194,8 +194,8 @@ def _add_keys(rows: list[list[Tag]]) -> None:
         if not any(WORD.search(text) for text in texts):
             for cell in (head, *column):
                 cell["class"] = [*cell.get_attribute_list("class", []), "number"]
-                for text in cell.find_all(string=BRACKETS):
-                    text.replace_with(BRACKETS.sub(lambda part: part[0].replace(" ", "\xa0"), text))
+                for text in cell.find_all(string=TOGETHER):
+                    text.replace_with(TOGETHER.sub(lambda part: part[0].replace(" ", "\xa0"), text))
 
 
 def _add_bars(soup: BeautifulSoup, rows: list[list[Tag]]) -> bool:
