@@ -114,10 +114,8 @@ def _finish(
     texts = (paragraph.astext() for paragraph in doctree.findall(nodes.paragraph))
     first = next((text for text in texts if len(text) > 40), context.get("title", ""))
     context["description"] = textwrap.shorten(first, 200, placeholder=" …")
-    pictures = [image["uri"] for image in doctree.findall(nodes.image)]
-    shown = [app.builder.images[uri] for uri in pictures if uri in app.builder.images]
-    if shown:
-        context["picture"] = f"_images/{shown[0]}"
+    pictures = (image["uri"] for image in doctree.findall(nodes.image))  # as the page sees them
+    context["picture"] = next((uri for uri in pictures if uri.endswith(".png")), None)
 
 
 def _write_texts(app: Sphinx, error: Exception | None) -> None:
