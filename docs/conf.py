@@ -4,8 +4,9 @@ from pathlib import Path
 
 from sphinx.ext import autosummary
 
+from replication.site.extension import source_of
+
 project = "Unified IRL, replicated"
-author = "The replication authors"
 copyright = "the replication authors, MIT licence"
 language = "en"
 
@@ -14,7 +15,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
+    "sphinx.ext.linkcode",
     "replication.site.extension",
 ]
 exclude_patterns = ["figures", "replication", "data", "source"]
@@ -24,15 +25,15 @@ autosummary.WELL_KNOWN_ABBREVIATIONS += (  # type: ignore[assignment]
 )
 
 nb_execution_mode = "off"
-nb_code_prompt_show = "Show the code of this cell"
-nb_code_prompt_hide = "Hide the code"
+nb_code_prompt_show = "code"
+nb_code_prompt_hide = "hide the code"
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 
+linkcode_resolve = source_of  # a page of coloured code for each module would weigh seven times more
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
-viewcode_follow_imported_members = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 add_module_names = False
@@ -50,12 +51,14 @@ html_theme_options = {
     "show_toc_level": 2,
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
+    "footer_content_items": ["copyright.html"],
 }
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_js_files = ["sortable.min.js", "sortable.a11y.min.js"]
 html_math_renderer = "mathml"
+html_search_scorer = str(Path(__file__).parent / "scorer.js")
 html_copy_source = False
 html_show_sourcelink = False
 html_last_updated_fmt = None

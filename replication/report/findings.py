@@ -25,6 +25,7 @@ from replication.evidence.sensitivity import (
     unchanged,
 )
 from replication.evidence.specifications import DEFAULT, named_choices
+from replication.evidence.verdicts import INCONCLUSIVE, NOT_TESTABLE, SHOWN
 from replication.irl import METHODS
 from replication.paper.register import load_choices
 from replication.report.choices import NAMES
@@ -230,8 +231,55 @@ def _by_value(levels: pd.DataFrame, part: pd.DataFrame, claim: str, choice: str)
     return ", ".join(texts)
 
 
+STEADY = 0.9
+"""Share of the specifications that must agree with a finding, for it to be robust."""
+
+ROBUST, FRAGILE, NOT_TESTED = "robust", "fragile", "not tested"
+
+
+def robustness(judged: pd.DataFrame, holds: int, count: int) -> str:
+    """Say in one word whether a finding is the same in other cells and with other choices.
+
+    It is robust if all cells have one verdict that is settled, and nine of ten specifications
+    agree: the claim holds in them if it is shown, and does not if it is not.
+    """
+    share = holds / count
+    agree = share if (judged["verdict"] == SHOWN).all() else 1 - share
+    unsettled = judged["verdict"].isin([INCONCLUSIVE, NOT_TESTABLE]).any()
+    same = judged["verdict"].nunique() == 1
+    return ROBUST if same and not unsettled and agree >= STEADY else FRAGILE
+
+
+def held(effects: pd.DataFrame, id: str) -> tuple[int, int]:
+    """Return in how many specifications a claim holds on its own map, and how many there are."""
+    return counted(_specifications(effects, id), id)
+
+
+def counted(rows: pd.DataFrame, id: str) -> tuple[int, int]:
+    """Return in how many of some specifications a claim holds, and how many there are.
+
+    The error of the unified method falls to zero where none of its trials ends at the cap, whatever
+    the other method does.
+    """
+    zero = load_claims().by_id(id).statistic == "share"
+    holds = rows["capped_x"] == 0 if zero else rows["outcome"] == HOLDS
+    return int(holds.sum()), len(rows)
+
+
 def holding(effects: pd.DataFrame, id: str) -> str:
     """Say in how many specifications a claim holds on its own map; in soccer, of single changes."""
+    claim, rows = load_claims().by_id(id), _specifications(effects, id)
+    if rows.empty:
+        return "–"
+    if claim.task == "soccer" or not METHODS[claim.x].uses_incorrect:
+        return _counts(rows)
+    opposite = rows["specification"].map(lambda name: shows_opposite(named_choices(name)))
+    with_it, without = _counts(rows[opposite]), _counts(rows[~opposite])
+    return f"with moves in the opposite direction {with_it}; without {without}"
+
+
+def _specifications(effects: pd.DataFrame, id: str) -> pd.DataFrame:
+    """Return the specifications on a claim's own map in which it has an effect."""
     claims = load_claims()
     claim = claims.by_id(id)
     if claim.task == "soccer":
@@ -242,14 +290,7 @@ def holding(effects: pd.DataFrame, id: str) -> str:
         place = "open" if claim.task == "open-maze" else "obstacles"
         on_map = effects["specification"].map(lambda name: named_choices(name).get("MAP") == place)
         rows = effects[effects["claim"].isin(same) & (effects["group"] == "factorial") & on_map]
-    rows = rows[rows["outcome"] != UNDEFINED]
-    if rows.empty:
-        return "–"
-    if claim.task == "soccer" or not METHODS[claim.x].uses_incorrect:
-        return _counts(rows)
-    opposite = rows["specification"].map(lambda name: shows_opposite(named_choices(name)))
-    with_it, without = _counts(rows[opposite]), _counts(rows[~opposite])
-    return f"with moves in the opposite direction {with_it}; without {without}"
+    return rows[rows["outcome"] != UNDEFINED]
 
 
 def shows_opposite(choices: Mapping[str, str]) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from replication.evidence.claims import LABELS, load_claims
+from replication.evidence.claims import LABELS, label, load_claims
 from replication.evidence.experiments import GENERAL, NAMED, NONE
 from replication.evidence.verdicts import NOT_TESTABLE, SHOWN
 from replication.irl import READINGS, get_method
@@ -86,10 +86,40 @@ MEAN: dict[str, Form] = {
     "Mean [95 %]": lambda row: interval(row.mean, row.low, row.high),
     "SD": lambda row: number(row.sd),
 }
-CAPPED: dict[str, Form] = {"At the cap": lambda row: f"{row.capped} of {row.n}"}
+
+
+def _capped(table: pd.DataFrame) -> dict[str, Form]:
+    """Return the column of the trials at the iteration cap, if there are any."""
+    if not table["capped"].any():
+        return {}
+    return {"At the cap": lambda row: f"{row.capped} of {row.n}"}
 
 
 # --- tables of the experiments ---------------------------------------------------------------
+
+MEASURES: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "task": ("Task", lambda task: task.replace("-", " ")),
+    "method": ("Method", lambda method: get_method(method).label),
+    "reading": ("Reading", F_LABELS.__getitem__),
+    "set": ("Incorrect", lambda set: SET_LABELS.get(set, set)),
+    "iterations": ("Iterations", "{:.2f}".format),
+    "converged": ("Reach zero", "{:.0%}".format),
+    "steps": ("Steps", "{:,.0f}".format),
+    "early_collisions": ("Collisions at first", "{:,.0f}".format),
+    "early_errors": ("Errors at first", "{:,.0f}".format),
+    "q_growth": ("Growth of Q", "{:z.3f}".format),
+    "reward_growth": ("Growth of the reward", "{:z.3f}".format),
+}
+"""Heading and form of each key and measure of a trial."""
+
+
+def readable_means(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of means by method, with names for keys and rounded numbers."""
+    shown = {}
+    for name, values in table.items():
+        heading, form = MEASURES[str(name)]
+        shown[heading] = ["–" if value != value else form(value) for value in values]
+    return pd.DataFrame(shown)
 
 
 def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
@@ -98,7 +128,7 @@ def readable_summary(table: pd.DataFrame) -> pd.DataFrame:
     columns["Median (quartiles)"] = lambda row: (
         f"{row.median:g} ({row.quartile_1:g}–{row.quartile_3:g})"
     )
-    columns |= CAPPED
+    columns |= _capped(table)
     columns["First 100: mean (SD)"] = lambda row: (
         f"{number(row.first_mean)} ({number(row.first_sd)})"
     )
@@ -235,7 +265,9 @@ def readable_predictions(table: pd.DataFrame) -> pd.DataFrame:
     for id, part in table.groupby("id", sort=False):
         claim = load_claims().by_id(str(id))
         if claim.prediction:
-            rows.append({"Claim": id, "Predicted": claim.prediction, "Came out": sentence(part)})
+            rows.append(
+                {"Claim": label(str(id)), "Predicted": claim.prediction, "Came out": sentence(part)}
+            )
     return pd.DataFrame(rows)
 
 
@@ -259,7 +291,7 @@ def readable_outcomes(table: pd.DataFrame) -> pd.DataFrame:
     return readable(
         table,
         {
-            "Claim": lambda row: row.claim,
+            "Claim": lambda row: label(row.claim),
             "Choices": lambda row: groups[row.group],
             "Specifications": lambda row: row.specifications,
             "Holds": lambda row: row.holds,
@@ -301,4 +333,4 @@ def readable_ablations(table: pd.DataFrame) -> pd.DataFrame:
     }
     choices: dict[str, Form] = {"Choices": lambda row: row.choices}
     median: dict[str, Form] = {"Median": lambda row: f"{row.median:g}"}
-    return readable(table, METHOD | choices | MEAN | median | CAPPED | more)
+    return readable(table, METHOD | choices | MEAN | median | _capped(table) | more)

@@ -19,7 +19,7 @@ from replication.irl import Trial
 from replication.learning.seeds import child
 from replication.paper.published import PUBLISHED, PUBLISHED_CURVES, Published
 from replication.report.outputs import Outputs
-from replication.report.readable import markdown
+from replication.report.readable import markdown, readable_means
 from replication.trials.compute import TRACED_TRIAL
 from replication.trials.measures import Report
 from replication.trials.run import run_trials
@@ -135,8 +135,8 @@ class Study(Outputs):
         return self.conditions[key].trial(seed=seed, keep=True)
 
     def show(self, table: pd.DataFrame) -> Markdown:
-        """Show a table that is not written."""
-        return Markdown(markdown(table))
+        """Show a table of means, which is not written."""
+        return Markdown(markdown(readable_means(table)))
 
 
 def _given(choices: Mapping[str, Any] | str) -> dict[str, Any]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import lzma
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -17,11 +19,13 @@ from replication.evidence.tables import read_table
 from replication.files import read_file, read_text, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
-from replication.pipeline.manifest import FRESH, read_runs
+from replication.pipeline.manifest import FRESH
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
-from replication.report.findings import holding
-from replication.site import overview
+from replication.report.findings import held
+from replication.report.outputs import TRIALS
+from replication.site import extension, overview
+from replication.site.choices import choices
 from replication.site.findings import render_findings
 from replication.site.pages import Origin, link_pages, page
 
@@ -33,6 +37,10 @@ REFERENCE = "api/modules/"
 
 INDEX = "searchindex.js"
 """A file that Sphinx writes into every site, and nothing else writes."""
+
+
+UNUSED = (".*", "*.map", "locales", "logo_*", "fontawesome.js", "fa-brands-*", "fa-regular-*")
+"""Files that Sphinx and its theme write, but no page asks for."""
 
 
 class SiteError(UserError):
@@ -125,13 +133,15 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     for path in sorted(docs.glob("round_1/*")):
         yield path.relative_to(docs).as_posix(), read_file(path)
     for path in sorted(out.glob("[!.]*/[!.]*")):
-        if path.suffix != ".ipynb":
-            yield f"figures/{path.relative_to(out).as_posix()}", read_file(path)
-    recorded = read_runs(out)
+        name = f"figures/{path.relative_to(out).as_posix()}"
+        if path.name == TRIALS:
+            yield f"{name}.xz", lzma.compress(read_file(path), preset=9)
+        elif path.suffix != ".ipynb":
+            yield name, read_file(path)
+    captions = tomllib.loads(read_text(docs / "captions.toml"))
     for run in runs:
-        done = recorded.get(run.name, {})
         parameters = {**run.notebook.literals, **run.values}
-        origin = Origin(run.name, parameters, done.get("seconds"), done.get("machine", ""))
+        origin = Origin(run.name, parameters, captions.get(run.name, {}))
         shown = page(run.folder / EXECUTED, origin)
         yield f"notebooks/{run.name}.ipynb", json.dumps(shown, indent=1).encode()
         yield f"source/{run.name}.ipynb", read_file(run.notebook.path)
@@ -155,14 +165,14 @@ def _generated(out: Path) -> dict[str, str]:
     """Return what the site computes from the published tables: parts of pages, and a page."""
     judged = read_table(out / "claims" / "verdicts.csv")
     effects = read_table(out / "sensitivity" / "effects.csv")
-    holds = {id: holding(effects, id) for id in judged["id"].unique()}
+    holds = {id: held(effects, id) for id in judged["id"].unique()}
     findings, answer = render_findings(out)
     return {
         "answer": answer,
         "findings.md": findings,
         "verdicts": overview.verdicts(judged, holds),
         "published": overview.published(judged),
-        "choices": overview.choices(read_table(out / "sensitivity" / "shares.csv")),
+        "choices": choices(read_table(out / "sensitivity" / "shares.csv")),
         "citation": overview.citation(read_text(files.PROJECT / "CITATION.cff")),
     }
 
@@ -185,12 +195,13 @@ def _write(work: Path) -> None:
 
 
 def _outline(source: Path) -> str:
-    """Return the titles of the pages and their order, and the modules that have pages."""
+    """Return what is in all pages: titles, their order, modules, and what our extension adds."""
     part = re.compile(r"^# [^\n]*|^```{toctree}.*?^```", flags=re.MULTILINE | re.DOTALL)
     pages = (read_text(path) for path in sorted(source.glob("*.md")))
     titles = [title for text in pages for title in part.findall(text)]
     modules = sorted((files.PROJECT / "replication").rglob("*.py"))
-    return "\n".join([*titles, *(path.as_posix() for path in modules)])
+    code = read_text(Path(extension.__file__))  # what it makes of a page is in no source
+    return "\n".join([*titles, *(path.as_posix() for path in modules), code])
 
 
 def _replace(new: Path, site: Path) -> None:
@@ -199,7 +210,7 @@ def _replace(new: Path, site: Path) -> None:
     draft, old = (site.with_name(f".{site.name}.{kind}") for kind in ("draft", "old"))
     for left in (draft, old):
         shutil.rmtree(left, ignore_errors=True)
-    shutil.copytree(new, draft, ignore=shutil.ignore_patterns(".*", "*.map"))
+    shutil.copytree(new, draft, ignore=shutil.ignore_patterns(*UNUSED))
     if site.exists():
         site.replace(old)
     draft.replace(site)

@@ -1,9 +1,13 @@
-"""Sphinx extension: formulas as MathML, and sortable, downloadable tables."""
+"""Sphinx extension: formulas as MathML, better tables, and a search that works from disk."""
 
 from __future__ import annotations
 
 import html
+import json
 import re
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -15,13 +19,23 @@ from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 from sphinx.writers.html5 import HTML5Translator
 
-NUMBER = re.compile(r"[×≥~]?\s*([-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)")
+from replication import files
+from replication.files import read_file, write_file
+
+NUMBER = re.compile(r"[×≥~<]?\s*([-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)")
+TOGETHER = re.compile(r"\[[^\]]*\]|[×≥~<] (?=\d)")
+WORD = re.compile(r"[^\W\d_]{2}")
+
+HOLDS = "Holds with other choices"
+"""Head of the column that is shown as bars."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register everything with Sphinx."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
-    app.connect("html-page-context", _improve_tables, priority=900)
+    app.connect("html-page-context", _finish, priority=900)
+    app.connect("build-finished", _write_texts)
+    app.connect("build-finished", _write_code)
     app.connect("autodoc-skip-member", _skip_fields)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -31,6 +45,31 @@ def _skip_fields(
 ) -> bool | None:
     """Leave out the fields of named tuples, which their docstrings describe."""
     return True if type(value).__name__ == "_tuplegetter" else None
+
+
+CODE = "code/"
+"""Where the package's code lies in the site."""
+
+
+# --- code ------------------------------------------------------------------------------------
+
+
+def source_of(domain: str, info: Mapping[str, str]) -> str | None:
+    """Return the address of an object's code, as the first page sees it."""
+    module = files.PROJECT / info["module"].replace(".", "/")
+    path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
+    if domain != "py" or not path.exists():
+        return None
+    name = info["fullname"].rpartition(".")[2]
+    at = f"text=def%20{quote(name)}&text=class%20{quote(name)}"  # browsers scroll to the first
+    return f"{CODE}{path.relative_to(files.PROJECT).as_posix()}.txt#:~:{at}"
+
+
+def _write_code(app: Sphinx, error: Exception | None) -> None:
+    """Write the package's code beside the pages, as text that a browser shows."""
+    for path in files.PROJECT.glob("replication/**/*.py"):
+        name = path.relative_to(files.PROJECT).as_posix()
+        write_file(Path(app.outdir) / "code" / f"{name}.txt", read_file(path))
 
 
 # --- formulas --------------------------------------------------------------------------------
@@ -61,32 +100,69 @@ def formula(tex: str, *, as_block: bool = False) -> str:
         raise SphinxError(f"the formula {tex!r} cannot be shown: {error}") from None
 
 
-# --- tables ----------------------------------------------------------------------------------
+# --- pages -----------------------------------------------------------------------------------
 
 
-def _improve_tables(
+def _finish(
     app: Sphinx, name: str, template: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
-    if doctree is not None and "<table" in context.get("body", ""):
-        context["body"] = improve_tables(context["body"])
+    """Improve the tables of a page, and say what it shows to those who get a link to it."""
+    if doctree is None:
+        return
+    body = context["body"].replace(f'href="{CODE}', f'href="{context["content_root"]}{CODE}')
+    context["body"] = improve_tables(body) if "<table" in body else body
+    texts = (paragraph.astext() for paragraph in doctree.findall(nodes.paragraph))
+    first = next((text for text in texts if len(text) > 40), context.get("title", ""))
+    context["description"] = textwrap.shorten(first, 200, placeholder=" …")
+    pictures = (image["uri"] for image in doctree.findall(nodes.image))  # as the page sees them
+    context["picture"] = next((uri for uri in pictures if uri.endswith(".png")), None)
+
+
+def _write_texts(app: Sphinx, error: Exception | None) -> None:
+    """Write what the search shows of each page: a page from disk may not read the others.
+
+    Sphinx's search fetches a page to show a part of it; here it finds the text in a script.
+    """
+    if error:
+        return
+    texts = {}
+    for name in sorted(app.env.found_docs):
+        tree = app.env.get_doctree(name)
+        for node in [*tree.findall(nodes.raw), *tree.findall(nodes.literal_block)]:
+            node.parent.remove(node)
+        written = "" if name.startswith("api/") else " ".join(tree.astext().split())
+        texts[name] = html.escape(written) or " "
+    script = (
+        f"const TEXTS = {json.dumps(texts, ensure_ascii=False)};\n"
+        "window.fetch = (url) => {\n"
+        '  const text = TEXTS[url.replace(/^\\.\\/|\\.html$/g, "")] ?? " ";\n'
+        '  return Promise.resolve({ text: () => `<main role="main">${text}</main>` });\n'
+        "};\n"
+    )
+    write_file(Path(app.outdir) / "_static" / "searchtexts.js", script)
+
+
+# --- tables ----------------------------------------------------------------------------------
 
 
 def improve_tables(body: str) -> str:
     """Return a page whose tables with a head can be sorted, scrolled and downloaded.
 
     The columns sort by the number that their cells begin with, if all do, and else as text. A table
-    gets a link to its cells as CSV unless a link to a CSV file stands below it.
+    gets a link to its cells as CSV unless a link to a CSV file stands below it. One that says what
+    holds with other choices shows it as bars, and becomes a card for each row on a telephone.
     """
     soup = BeautifulSoup(body, "html.parser")
     for number, table in enumerate(soup.find_all("table"), 1):
         head = table.find("thead")
         if not isinstance(table, Tag) or head is None:
             continue
-        table["class"] = " ".join([*table.get_attribute_list("class"), "sortable"])
+        kinds = [*table.get_attribute_list("class"), "sortable"]
         rows = [list(row.find_all(["td", "th"])) for row in table.find_all("tr")]
-        _add_keys(rows[1:])
+        _add_keys(rows)
         for cell in rows[0]:
             cell["scope"] = "col"
+        table["class"] = " ".join([*kinds, *["cards"] * _add_bars(soup, rows)])
         title = " ".join(cell.get_text(" ", strip=True) for cell in rows[0][:2])
         box = soup.new_tag("div", attrs={"class": "table-box", "role": "region", "tabindex": "0"})
         box["aria-label"] = f"Table {number}: {title}"
@@ -97,20 +173,47 @@ def improve_tables(body: str) -> str:
         link = soup.new_tag("a", href=f"data:text/csv;charset=utf-8,{quote(_csv(rows))}")
         link["class"] = "table-csv"
         link["download"] = f"table-{number}.csv"
-        link.string = "this table as CSV"
+        link.string = "CSV"
+        link["aria-label"] = f"Table {number} as CSV"
         box.insert_after(link)
     return str(soup)
 
 
 def _add_keys(rows: list[list[Tag]]) -> None:
     """Give each cell of a column of numbers the number as its sorting key."""
-    for column in zip(*rows, strict=False):
+    for head, *column in zip(*rows, strict=False):
         texts = [cell.get_text(" ", strip=True) for cell in column]
         matches = [NUMBER.match(text) for text in texts]
-        if all(match or text in ("", "–") for match, text in zip(matches, texts, strict=True)):
-            for cell, match in zip(column, matches, strict=True):
-                number = match[1].replace(",", "") if match else ""
-                cell["data-sort"] = number
+        numbers = (match or text in ("", "–") for match, text in zip(matches, texts, strict=True))
+        if not any(matches) or not all(numbers):
+            continue
+        for cell, match in zip(column, matches, strict=True):
+            cell["data-sort"] = match[1].replace(",", "") if match else ""
+        if not any(WORD.search(text) for text in texts):
+            for cell in (head, *column):
+                cell["class"] = [*cell.get_attribute_list("class", []), "number"]
+                for text in cell.find_all(string=TOGETHER):
+                    text.replace_with(TOGETHER.sub(lambda part: part[0].replace(" ", "\xa0"), text))
+
+
+def _add_bars(soup: BeautifulSoup, rows: list[list[Tag]]) -> bool:
+    """Draw a bar beside each "3 of 48" in the column of what holds; return if there is one.
+
+    The cells are also given the head of their column, which stands beside them in a card.
+    """
+    heads = [cell.get_text(" ", strip=True) for cell in rows[0]]
+    if HOLDS not in heads:
+        return False
+    for row in rows[1:]:
+        for head, cell in zip(heads, row, strict=True):
+            cell["data-label"] = head
+        cell = row[heads.index(HOLDS)]
+        if match := re.match(r"(\d+) of (\d+)", cell.get_text(strip=True)):
+            share = int(match[1]) / max(1, int(match[2]))
+            bar = soup.new_tag("span", attrs={"class": "bar", "style": f"--share: {share:.1%}"})
+            bar["aria-hidden"] = "true"
+            cell.insert(0, bar)
+    return True
 
 
 def _csv(rows: list[list[Tag]]) -> str:

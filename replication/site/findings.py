@@ -14,10 +14,17 @@ import pandas as pd
 
 from replication import files
 from replication.evidence.claims import LABELS, label, load_claims
-from replication.evidence.experiments import GENERAL
+from replication.evidence.experiments import GENERAL, NAMED
 from replication.evidence.tables import read_table
-from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, by_claim
-from replication.report.findings import at_once, chance, holding, shows_opposite
+from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, SHOWN, by_claim
+from replication.report.findings import (
+    at_once,
+    chance,
+    counted,
+    holding,
+    robustness,
+    shows_opposite,
+)
 from replication.report.readable import (
     F_LABELS,
     SET_LABELS,
@@ -69,10 +76,26 @@ def numbers(figures: Path) -> dict[str, Any]:
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
     opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
     sentences = {id: sentence(rows) for id, rows in by_claim(judged)}
+    claims = {
+        name: compared[compared["id"].isin([name, *(f"{name}-{task}" for task in TASKS)])]
+        for name in ANSWERED
+    }
+    saves = claims["SAVES"]
     return {
         "judging": load_claims().judging,
         "sentence": sentences,
         "on_tasks": {name: _on_tasks(name, sentences) for name in ("SAVES", "AVOIDS", "ERRS")},
+        "found": {name: found(rows) for name, rows in claims.items()},
+        "found_with": {
+            "opposite": found(saves[saves["set"] == GENERAL]),
+            "other": found(saves[saves["set"] == NAMED]),
+            "soccer": found(saves[saves["task"] == "soccer"]),
+        },
+        "range": {
+            "FASTER": _range(claims["FASTER"]),
+            "SAVES": _range(saves[saves["set"] == GENERAL]),
+        },
+        "other": {name: _other(factorial, rows, ANSWERED[name]) for name, rows in claims.items()},
         "verdicts": markdown(readable_verdicts(compared)),
         "holds": [
             (label(id), holding(effects, id)) for id in compared["id"].unique() if id in HOLDING
@@ -109,15 +132,39 @@ def numbers(figures: Path) -> dict[str, Any]:
     }
 
 
+TASKS = ("OPEN", "OBSTACLES", "SOCCER")
+"""How ids of claims end that are judged on each task."""
+
+ANSWERED = {"ZERO": "ZERO-OPEN", "FASTER": "FASTER", "SAVES": "SAVES-OPEN", "AVOIDS": "AVOIDS-OPEN"}
+"""The claims of the answer, on all tasks, and how the specifications on all maps name them."""
+
+
+def found(rows: pd.DataFrame) -> str:
+    """Say in one or two words what came out in all cells together."""
+    if rows["verdict"].nunique() == 1:
+        return str(rows["verdict"].iloc[0])
+    shown = int((rows["verdict"] == SHOWN).sum())
+    return f"{SHOWN} in {shown} of {len(rows)} cells" if shown else f"not {SHOWN}"
+
+
+def _range(rows: pd.DataFrame) -> str:
+    """Return the least and the largest effect of some cells."""
+    return f"{fixed(rows['effect'].min())} to {fixed(rows['effect'].max())}"
+
+
+def _other(factorial: pd.DataFrame, judged: pd.DataFrame, id: str) -> dict[str, Any]:
+    """Return in how many specifications on all maps a claim holds, and if the finding is robust."""
+    holds, count = counted(factorial[factorial["claim"] == id], id)
+    return {"holds": holds, "count": count, "word": robustness(judged, holds, count)}
+
+
 HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
 """The claims of which the findings say in how many other sets of choices they hold."""
 
 
 def _on_tasks(name: str, sentences: Mapping[str, str]) -> str:
     """Say what a claim about incorrect demonstrations comes to on each task; alike ones at once."""
-    open_maze, obstacles, soccer = (
-        sentences[f"{name}-{task}"] for task in ("OPEN", "OBSTACLES", "SOCCER")
-    )
+    open_maze, obstacles, soccer = (sentences[f"{name}-{task}"] for task in TASKS)
     mazes = f"Open maze: {open_maze}. Obstacles: {obstacles}"
     if open_maze == obstacles:
         mazes = f"In both mazes: {open_maze}"

@@ -1,13 +1,10 @@
-"""What the site shows of all notebooks together: verdicts, choices, the citation.
-
-Each function returns Markdown, computed from the published tables and the registers.
-"""
+"""What the site shows of all notebooks together, as Markdown: verdicts and the citation."""
 
 from __future__ import annotations
 
 import html
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -16,7 +13,8 @@ import yaml
 from replication.evidence.claims import evidence
 from replication.evidence.experiments import NAMED, NONE
 from replication.irl import READINGS
-from replication.paper.register import Choice, load_choices
+from replication.report.findings import NOT_TESTED, robustness
+from replication.report.outputs import TRIALS
 from replication.report.readable import (
     F_LABELS,
     SET_LABELS,
@@ -30,7 +28,7 @@ WIDTH, MARGIN, LINE = 190, 6, 10
 """Of an interval plot, in pixels; a cell takes one line."""
 
 
-def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
+def verdicts(judged: pd.DataFrame, holds: Mapping[str, tuple[int, int]]) -> str:
     """Return the claims with their intervals, each verdict with a link to its evidence.
 
     Parameters
@@ -38,15 +36,19 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
     judged
         The table of verdicts.
     holds
-        By claim, in how many of the other specifications it holds.
+        By claim, in how many of the other specifications it holds, and how many there are.
     """
     rows = []
     for id, part in _comparative(judged).groupby("id", sort=False):
         first = part.iloc[0]
         notebook, name = evidence(first["task"], first["measure"]).split("/")
         shown = (
-            f"#{anchor(notebook, name)}" if name != "trials" else f"figures/{notebook}/trials.csv"
+            f"figures/{notebook}/{TRIALS}.xz"
+            if f"{name}.csv" == TRIALS
+            else f"#{anchor(notebook, name)}"
         )
+        count, of = holds[str(id)]
+        word = f"{count} of {of}: **{robustness(part, count, of)}**" if of else NOT_TESTED
         paper = "–" if math.isnan(first["paper"]) else f"{first['paper']:.2f}"
         rows.append(
             {
@@ -54,7 +56,7 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, str]) -> str:
                 "Verdict": f"[{sentence(part)}]({shown})",
                 "Paper": f"{paper} ({first['place']})".removeprefix("– "),
                 "Effects, with 95 % intervals": interval_plot(part),
-                "Holds with other choices": holds[str(id)],
+                "Holds with other choices": word,
             }
         )
     return markdown(pd.DataFrame(rows))
@@ -146,52 +148,7 @@ def _in_words(part: pd.DataFrame) -> str:
     return ". ".join(sentences) + "."
 
 
-# --- choices and citation --------------------------------------------------------------------
-
-
-def choices(shares: pd.DataFrame) -> str:
-    """Return every choice: a table of all, and a section on each.
-
-    Parameters
-    ----------
-    shares
-        By claim and choice, the share of the variance of the claim's effect over specifications.
-    """
-    entries = list(load_choices().values())
-    table = pd.DataFrame(
-        {
-            "Choice": [f"[{entry.id}](#choice-{entry.id.lower()})" for entry in entries],
-            "Where": [entry.place for entry in entries],
-            "Default": [
-                f"`{entry.default}`" if entry.field else entry.default for entry in entries
-            ],
-            "Also accepted": [_alternatives(entry) for entry in entries],
-            "Matters most to": [_matters(entry, shares) for entry in entries],
-        }
-    )
-    return "\n".join([markdown(table), *(line for entry in entries for line in _section(entry))])
-
-
-def _section(entry: Choice) -> Iterator[str]:
-    yield f"(choice-{entry.id.lower()})=\n"
-    yield f"### {entry.id}\n"
-    yield f"*{entry.place}.* {entry.open}\n"
-    yield f"**Default:** `{entry.default}`. {entry.rule}\n"
-    where = entry.field or entry.data or entry.code
-    yield f"**Also accepted:** {_alternatives(entry)}. **Where it is set:** `{where}`.\n"
-
-
-def _alternatives(entry: Choice) -> str:
-    if entry.range is not None:
-        return f"{entry.range[0]:g} to {entry.range[1]:g}"
-    return ", ".join(f"`{value}`" for value in entry.alternatives) or "–"
-
-
-def _matters(entry: Choice, shares: pd.DataFrame) -> str:
-    varied = shares[shares["choice"] == ("MAP" if entry.id.startswith("MAP-") else entry.id)]
-    large = varied[varied["share"] >= 0.05].sort_values("share", ascending=False)
-    claims = ", ".join(f"{row.claim} ({100 * row.share:.0f} %)" for row in large.itertuples())
-    return claims or ("none" if len(varied) else "–")
+# --- the citation ----------------------------------------------------------------------------
 
 
 def citation(text: str) -> str:

@@ -7,16 +7,16 @@ it displayed it: kind, name, words and code (see :mod:`replication.report.output
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from replication.files import read_json
 from replication.paper.register import load_choices
 
-SHOWN = ("seed", "trials", "set_trials", "choices")
-"""Parameters that a reader wants to know of a run."""
+SHOWN = {"seed": "Root seed", "trials": "trials of each method", "choices": "choices"}
+"""Parameters that a reader wants to know of a run, in words."""
 
 
 @dataclass(frozen=True)
@@ -29,36 +29,36 @@ class Origin:
         Its name.
     parameters
         The parameters of the run.
-    seconds, machine
-        Run time of the whole notebook, and where; None and empty if not recorded on this machine.
+    captions
+        By the name of a figure, what a reader should know of it; it may name parameters.
     """
 
     notebook: str
     parameters: Mapping[str, Any]
-    seconds: float | None = None
-    machine: str = ""
+    captions: Mapping[str, str] = field(default_factory=dict)
 
-    def line(self, folder: Path, name: str, code: str = "") -> str:
-        """Return the line under an output: its run, its files in `folder`, and its code."""
+    def line(self) -> str:
+        """Return the line at the end of the page: its run, and the notebook itself."""
         values = [
-            f"{key} = {self.parameters[key]}"
-            for key in SHOWN
+            f"{words} {self.parameters[key]}"
+            for key, words in SHOWN.items()
             if self.parameters.get(key) not in (None, {})
         ]
-        files = [
-            _download(suffix.upper(), f"figures/{self.notebook}/{name}.{suffix}")
-            for suffix in ("csv", "svg")  # pictures and players are on the page itself
-            if (folder / f"{name}.{suffix}").exists()
-        ]
-        took = f"the notebook ran {self.seconds:.0f} s" if self.seconds is not None else ""
+        return ", ".join([*values, _download("the notebook", f"source/{self.notebook}.ipynb")])
+
+    def links(self, folder: Path, name: str, code: str = "") -> str:
+        """Return the links under an output: its numbers in `folder`, and its code."""
+        csv = f"figures/{self.notebook}/{name}.csv"
         parts = [
-            ", ".join(values),
-            f"{took} on {self.machine}" if took and self.machine else took,
-            ", ".join(files),
-            _download("notebook", f"source/{self.notebook}.ipynb"),
-            f"code: {{py:func}}`~{code}`" if code else "",
+            _download("CSV", csv) if (folder / f"{name}.csv").exists() else "",
+            f"{{py:func}}`code <{code}>`" if code else "",
         ]
         return " · ".join(filter(None, parts))
+
+    def caption(self, name: str, words: str) -> str:
+        """Return the caption of a figure, or its words if it has none."""
+        text = self.captions.get(name)
+        return text.format(**self.parameters) if text else _escaped(words)
 
 
 def _download(text: str, file: str) -> str:
@@ -69,10 +69,29 @@ def page(published: Path, origin: Origin) -> dict[str, Any]:
     """Return the page of a published notebook, a notebook as JSON; its files lie beside it."""
     node: dict[str, Any] = read_json(published)
     named: set[str] = set()
-    node["cells"] = [
+    parts = [
         part for cell in node["cells"] for part in _parts(cell, published.parent, origin, named)
     ]
+    end = _text("origin", f"{{.provenance}}\n{origin.line()}\n")
+    node["cells"] = [*_joined(parts), end]
     return node
+
+
+def _text(id: str, source: str) -> dict[str, Any]:
+    return {"cell_type": "markdown", "id": id, "metadata": {}, "source": source}
+
+
+def _joined(cells: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Join cells of code that follow each other and show nothing in between."""
+    joined: list[dict[str, Any]] = []
+    for cell in cells:
+        last = joined[-1] if joined else {}
+        if cell["cell_type"] == "code" == last.get("cell_type") and not last["outputs"]:
+            source = "".join(last["source"]) + "\n\n" + "".join(cell["source"])
+            joined[-1] = {**cell, "id": last["id"], "source": source}
+        else:
+            joined.append(cell)
+    return joined
 
 
 def _parts(
@@ -89,32 +108,33 @@ def _parts(
     yield {**cell, "outputs": kept, "metadata": {**cell["metadata"], "tags": tags}}
     for at, text in enumerate(shown):
         if text is not None:
-            id = f"{cell['id']}-output-{at}"
-            yield {"cell_type": "markdown", "id": id, "metadata": {}, "source": text}
+            yield _text(f"{cell['id']}-output-{at}", text)
 
 
 def _shown(output: Mapping[str, Any], folder: Path, origin: Origin, named: set[str]) -> str | None:
     """Return an output as text of the page, or None where the output stays as it is.
 
-    A figure and the table beside it may have one name; links lead to the first of them.
+    A figure and the table beside it may have one name; links lead to the first of them. A figure is
+    shown in the smaller of its two files.
     """
     text = "".join(output.get("data", {}).get("text/markdown", ""))
     known = output.get("metadata", {}).get("replication")
     if known is None:
         return link_choices(text) if text else None
     kind, name = known["kind"], known["name"]
-    line = origin.line(folder, name, known.get("code", ""))
+    links = origin.links(folder, name, known.get("code", ""))
     file = f"../figures/{origin.notebook}/{name}"
     target = "" if name in named else f"({anchor(origin.notebook, name)})=\n\n"
     named.add(name)
     if kind == "figure":
         words = " ".join(known["alt"].split())
+        sizes = {each: (folder / f"{name}.{each}").stat().st_size for each in ("png", "svg")}
         return (
-            f"{target}````{{figure}} {file}.png\n:alt: {words}\n:width: 700px\n\n"
-            f"{_escaped(words)}\n\n{line}\n````"
+            f"{target}````{{figure}} {file}.{min(sizes, key=sizes.__getitem__)}\n"
+            f":alt: {words}\n:width: 860px\n\n{origin.caption(name, words)}\n\n{links}\n````"
         )
     body = f"```{{raw}} html\n:file: {file}.html\n```\n" if kind == "player" else text
-    return f"{target}{body}\n{{.provenance}}\n{line}\n"
+    return f"{target}{body}\n{{.provenance}}\n{links}\n"
 
 
 def anchor(notebook: str, name: str) -> str:
@@ -141,7 +161,8 @@ def link_choices(text: str) -> str:
 def link_pages(text: str) -> str:
     """Return a page of docs/ with its links to other folders as links within the site.
 
-    A published table or notebook is part of a page; any other file is laid out below the pages.
+    A published table or notebook is part of a page, and so is a choice; any other file is laid out
+    below the pages.
 
     Examples
     --------
@@ -154,6 +175,7 @@ def link_pages(text: str) -> str:
     text = re.sub(
         r"\]\(\.\./figures/(\w+)/(\w+)\.md\)", lambda m: f"](#{anchor(m[1], m[2])})", text
     )
+    text = re.sub(r"\]\(choices\.md#([\w-]+)\)", r"](#choice-\1)", text)
     return text.replace("](../", "](")
 
 

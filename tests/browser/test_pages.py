@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
 from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
-from replication.files import PROJECT
+from replication.files import PROJECT, read_json
 from replication.site.build import build_site
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)
@@ -39,8 +40,14 @@ READ = (
 PATIENCE = 1_200_000
 """Milliseconds after which something hangs, on however slow a machine."""
 
-SMALL = 5_000_000
+SMALL = 2_000_000
 """Bytes that a page may have, with all that it loads."""
+
+LIGHT = 15_000_000
+"""Bytes that the whole site may have."""
+
+FOLD = 900
+"""Pixels of the first screen, on which the answer stands."""
 
 
 @pytest.fixture(scope="session")
@@ -175,15 +182,163 @@ def soup(path: Path) -> BeautifulSoup:
 
 
 def test_every_figure_is_traced(site: Path) -> None:
-    """Data, notebook and code are under each figure, and the seed where it comes from a run."""
+    """Data and code are under each figure; once a page, the notebook, and the seed of its run."""
     for name in (*PLAYERS, "notebooks/claims", "notebooks/sensitivity"):
-        figures = soup(site / f"{name}.html").select("main figure")
+        main = soup(site / f"{name}.html").select_one("main article")
+        assert main is not None
+        figures = main.select("figure")
         assert figures
         for figure in figures:
             text = figure.get_text(" ", strip=True)
-            seed = ["seed = "] * (name in PLAYERS)
-            for part in (*seed, "CSV", "notebook", "code"):
-                assert part in text, (name, text)
+            assert "CSV" in text, (name, text)
+            assert "code" in text, (name, text)
+        assert main.get_text().count("Root seed") == (name != "notebooks/claims")
+        assert len(main.select("a[href$='.ipynb']")) == 1
+
+
+def test_every_figure_has_a_caption_for_readers() -> None:
+    """Each published figure has a caption that begins with its number or what it is about."""
+    captions = tomllib.loads((PROJECT / "docs" / "captions.toml").read_text(encoding="utf-8"))
+    for notebook in (PROJECT / "figures").glob("*/notebook.ipynb"):
+        known = [
+            output["metadata"].get("replication", {})
+            for cell in read_json(notebook)["cells"]
+            for output in cell.get("outputs", [])
+            if "metadata" in output
+        ]
+        figures = {each["name"] for each in known if each.get("kind") == "figure"}
+        assert figures == set(captions.get(notebook.parent.name, {})), notebook
+        for caption in captions.get(notebook.parent.name, {}).values():
+            assert caption.startswith("**")
+
+
+# --- the first screen ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [NARROW, WIDE], ids=["narrow", "wide"])
+def test_the_answer_stands_on_the_first_screen(open_page: Open, size: dict[str, int]) -> None:
+    """Its three sentences end within 900 pixels, and so do its five rows where there is room."""
+    page = open_page("index", size=size)
+    answer = page.locator("article ul").first
+    assert answer.locator("li").count() == 3
+    table = page.locator("article table").first
+    assert table.locator("tbody tr").count() == 5
+    last = answer if size == NARROW else table
+    box = last.bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] < FOLD
+
+
+def test_no_verdict_looks_final(open_page: Open) -> None:
+    """Each verdict of the home page has a word for how far it hangs on choices, and its bar."""
+    page = open_page("index")
+    tables = page.locator("article table.cards")
+    assert tables.count() == 2
+    for cell in tables.locator("tbody td[data-label='Holds with other choices']").all():
+        text = cell.inner_text()
+        assert re.search(r"robust|fragile|not tested", text)
+        assert cell.locator(".bar").count() == ("not tested" not in text)
+
+
+def test_a_link_that_is_shared_shows_something(site: Path) -> None:
+    """Titles differ; each page has a description, and where it has a picture shares that."""
+    titles = []
+    for name in READ:
+        page = soup(site / f"{name}.html")
+        assert page.title is not None
+        titles.append(page.title.get_text(strip=True))
+        description = page.select_one("meta[name=description]")
+        assert description is not None, name
+        assert len(str(description["content"])) > 20
+        picture = page.select_one("meta[property='og:image']")
+        if picture is not None:
+            assert ((site / f"{name}.html").parent / str(picture["content"])).exists()
+    assert len(set(titles)) == len(titles)
+    assert soup(site / "index.html").select_one("meta[property='og:image']") is not None
+
+
+# --- text, formulas, search ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", READ)
+def test_no_text_is_too_small(open_page: Open, name: str) -> None:
+    """All text of an article has at least 11 pixels, on a phone too; indices may be smaller."""
+    page = open_page(name, size=NARROW)
+    small = page.evaluate(
+        "[...document.querySelectorAll('article *')].filter(node =>"
+        " [...node.childNodes].some(text => text.nodeType === 3 && text.data.trim())"
+        " && !node.closest('math, sub, sup, .animation, script, style')"
+        " && parseFloat(getComputedStyle(node).fontSize) < 11).map(node => node.outerHTML)"
+    )
+    assert small == []
+
+
+def test_formulas_have_their_font(open_page: Open) -> None:
+    """The shipped font is loaded, a brace grows with its cases, and no formula is cut above."""
+    page = open_page("methods")
+    page.evaluate("document.fonts.ready")
+    assert page.evaluate("document.fonts.check('16px \"Report Math\"', 'x')")
+    brace, plain = (
+        page.evaluate(
+            "text => [...document.querySelectorAll('math mo')].filter(mo => mo.textContent.trim()"
+            " === text).map(mo => mo.getBoundingClientRect().height).sort((a, b) => b - a)[0]",
+            text,
+        )
+        for text in ("{", "=")
+    )
+    assert brace > 2 * plain
+    assert page.evaluate(
+        "[...document.querySelectorAll('.formula')].every(box =>"
+        " box.scrollHeight <= box.clientHeight)"
+    )
+
+
+def test_a_formula_looks_the_same_without_the_readers_fonts(open_page: Open) -> None:
+    """As a picture it is another one if the shipped font is taken away: none else is used."""
+    page = open_page("methods")
+    page.evaluate("document.fonts.ready")
+    formula = page.locator(".formula").first
+    shipped = formula.screenshot()
+    assert formula.screenshot() == shipped
+    page.add_style_tag(content="math { font-family: monospace !important; }")
+    assert formula.screenshot() != shipped
+
+
+def test_the_search_works_from_disk(open_page: Open) -> None:
+    """Results have a part of their page, and what is written for readers comes first."""
+    page = open_page("search")
+    page.goto(f"{page.url}?q=calibration")
+    results = page.locator("#search-results ul.search > li")
+    page.wait_for_function("document.querySelectorAll('#search-results .context').length > 3")
+    links = [
+        str(link) for link in results.locator("> a").evaluate_all("all => all.map(a => a.href)")
+    ]
+    code = ["/api/" in link for link in links]
+    assert code == sorted(code)
+    assert not code[0]
+    assert any(
+        "calibration" in text.lower() for text in results.locator(".context").all_inner_texts()
+    )
+
+
+# --- a telephone -----------------------------------------------------------------------------
+
+
+def test_wide_things_fit_a_telephone(open_page: Open) -> None:
+    """Verdicts are cards without a rest to the right; a figure is wide, and opens in full."""
+    page = open_page("index", size=NARROW)
+    for box in page.locator(".table-box:has(.cards)").all():
+        assert box.evaluate("box => box.scrollWidth <= box.clientWidth")
+    figure = page.locator("article figure").first
+    assert figure.locator("img").evaluate("image => image.clientWidth") >= 600
+    target = figure.locator("a:has(img)").evaluate("link => link.href")
+    assert target == figure.locator("img").evaluate("image => image.src")
+
+
+def test_the_index_fits_a_telephone(open_page: Open) -> None:
+    """The list of all names of the code needs no scrolling sideways."""
+    page = open_page("genindex", size=NARROW)
+    assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
 
 
 # --- the players -----------------------------------------------------------------------------
@@ -424,7 +579,7 @@ def test_a_table_without_a_file_can_be_downloaded(open_page: Open) -> None:
     with page.expect_download() as download:
         page.locator("a.table-csv").first.click()
     text = Path(download.value.path()).read_text(encoding="utf-8")
-    assert text.startswith('"Choice","Where"')
+    assert text.startswith('"Choice","What hangs on it')
     assert text.count("\n") == page.locator("table").first.locator("tr").count()
 
 
@@ -432,11 +587,11 @@ def test_a_table_without_a_file_can_be_downloaded(open_page: Open) -> None:
 
 
 def test_the_site_is_light(open_page: Open, site: Path) -> None:
-    """All pages weigh under 30 MB, tables of trials aside; each under 5 MB with what it loads."""
-    every = [path for path in site.rglob("*") if path.is_file() and path.name != "trials.csv"]
-    assert sum(path.stat().st_size for path in every) < 30_000_000
+    """The whole site weighs under 15 MB, and each page under 2 MB with all that it loads."""
+    assert sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) < LIGHT
     for name in READ:
         page = open_page(name)
+        assert page.locator("script[src*=fontawesome]").count() == 0
         loaded = page.evaluate("performance.getEntriesByType('resource').map(entry => entry.name)")
         files = {Path(unquote(urlparse(url).path)) for url in loaded if url.startswith("file:")}
         size = sum(file.stat().st_size for file in files | {site / f"{name}.html"})

@@ -12,6 +12,7 @@ from replication.evidence.claims import criteria_hash, load_claims
 from replication.evidence.rounding import settings, variants
 from replication.evidence.sensitivity import HOLDS, JOINT, OPEN, REVERSED, UNDEFINED
 from replication.evidence.specifications import Specification, load_specifications
+from replication.evidence.verdicts import ABSENT, INCONCLUSIVE, NOT_TESTABLE, SHOWN
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
 from replication.report.choices import NAMES
@@ -20,9 +21,12 @@ from replication.report.findings import (
     calibrated,
     caveats,
     chance,
+    counted,
     dependence,
+    held,
     holding,
     one_at_a_time,
+    robustness,
     rounded,
     shows_opposite,
 )
@@ -263,7 +267,7 @@ def test_chance_is_read_from_a_choice_that_cannot_act() -> None:
 # --- beside the verdicts ---------------------------------------------------------------------
 
 
-def held(claim: str, *specifications: tuple[str, str, int]) -> pd.DataFrame:
+def specified(claim: str, *specifications: tuple[str, str, int]) -> pd.DataFrame:
     """Make up effects of the factorial: specification, outcome and trials at the cap."""
     return pd.DataFrame(specifications, columns=["specification", "outcome", "capped"]).assign(
         claim=claim, group="factorial"
@@ -272,7 +276,7 @@ def held(claim: str, *specifications: tuple[str, str, int]) -> pd.DataFrame:
 
 EFFECTS = pd.concat(
     [
-        held(
+        specified(
             "SAVES-OPEN",
             ("MAP=open INCORRECT-KINDS=hit", OPEN, 0),
             ("MAP=open INCORRECT-KINDS=hit+detour", HOLDS, 1),
@@ -282,13 +286,15 @@ EFFECTS = pd.concat(
             ("MAP=obstacles INCORRECT-KINDS=opposite", HOLDS, 0),
             ("MAP=random-1 INCORRECT-KINDS=opposite", OPEN, 0),
         ),
-        held(
+        specified(
             "FASTER",
             ("MAP=open INCORRECT-KINDS=all", HOLDS, 0),
             ("MAP=open INCORRECT-KINDS=hit", UNDEFINED, 0),
             ("MAP=open INCORRECT-KINDS=hit", OPEN, 2),
         ),
-        held("SAVES-SOCCER", ("default", OPEN, 0), ("ALPHA=0.9", HOLDS, 0)).assign(group="single"),
+        specified("SAVES-SOCCER", ("default", OPEN, 0), ("ALPHA=0.9", HOLDS, 0)).assign(
+            group="single"
+        ),
     ]
 )
 
@@ -316,3 +322,37 @@ def test_the_opposite_direction_is_in_a_set_or_not() -> None:
     sets = ["all", "opposite", "hit+detour+opposite", "hit", "hit+near-detour"]
     found = [shows_opposite({"INCORRECT-KINDS": name}) for name in sets]
     assert found == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "holds", "word"),
+    [
+        ((SHOWN, SHOWN), 9, "robust"),
+        ((SHOWN, SHOWN), 8, "fragile"),
+        ((ABSENT, ABSENT), 1, "robust"),
+        ((ABSENT, ABSENT), 2, "fragile"),
+        ((REVERSED,), 0, "robust"),
+        ((SHOWN, ABSENT), 10, "fragile"),
+        ((SHOWN, ABSENT), 0, "fragile"),
+        ((INCONCLUSIVE, INCONCLUSIVE), 0, "fragile"),
+        ((NOT_TESTABLE,), 10, "fragile"),
+    ],
+)
+def test_robust_is_what_stays_the_same(verdicts: tuple[str, ...], holds: int, word: str) -> None:
+    """All cells are settled and alike, and nine of ten specifications agree with them."""
+    assert robustness(pd.DataFrame({"verdict": verdicts}), holds, 10) == word
+
+
+@pytest.mark.parametrize(("id", "held_in"), [("SAVES-OPEN", (3, 5)), ("FASTER", (1, 2))])
+def test_specifications_are_counted_on_the_claims_own_map(
+    id: str, held_in: tuple[int, int]
+) -> None:
+    """The count is that of the words, of all kinds of demonstrations together."""
+    assert held(EFFECTS, id) == held_in
+
+
+def test_the_error_falls_to_zero_whatever_the_other_method_does() -> None:
+    """A trial at the cap counts if it is one of the unified method."""
+    rows = pd.DataFrame({"capped_x": [0, 0, 3], "capped": [0, 10, 3], "outcome": ["open"] * 3})
+    assert counted(rows, "ZERO-OPEN") == (2, 3)
+    assert counted(rows, "FASTER") == (0, 3)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from replication.evidence.claims import load_claims
+from replication.evidence.claims import label, load_claims
 from replication.evidence.experiments import EXPERIMENTS, GENERAL, NAMED, NONE
 from replication.evidence.tables import read_table, write_csv
 from replication.evidence.verdicts import (
@@ -21,6 +21,7 @@ from replication.evidence.verdicts import (
 from replication.irl import READINGS
 from replication.report.readable import (
     F_LABELS,
+    MEASURES,
     SET_LABELS,
     full_label,
     markdown,
@@ -28,6 +29,7 @@ from replication.report.readable import (
     readable_contrasts,
     readable_kinds,
     readable_levels,
+    readable_means,
     readable_outcomes,
     readable_predictions,
     readable_sets,
@@ -249,7 +251,7 @@ def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
     ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-ADABOOST-OPEN"}
     judged = JUDGED[JUDGED["id"].isin([*ids])].replace({"id": ids})
     assert shown(readable_predictions(judged)) == [
-        f"{ids[id]} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
+        f"{label(ids[id])} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
         for id in ("A", "B")
     ]
 
@@ -287,10 +289,10 @@ def test_readable_outcomes_by_hand() -> None:
         ("FASTER", "factorial", 240, 20, 30, 9, 1, 7, 32, 19, 0, 3.456, -2.5, 9.0, NAN, NAN, 0),
     )
     assert shown(readable_outcomes(outcomes)) == [
-        "FASTER | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | 12 | < 0.001, 0.041 | "
-        "4.00 (-1.00, 9.00)",
-        "FASTER | all at once | 240 | 20 | 30 | 9 | 1 | 7 | 19 of 32 | 0 | – | –, – | "
-        "3.46 (-2.50, 9.00)",
+        "faster than AdaBoost-IRL | one at a time | 44 | 40 | 3 | 1 | 0 | 0 | 40 of 44 | 5 | 12 | "
+        "< 0.001, 0.041 | 4.00 (-1.00, 9.00)",
+        "faster than AdaBoost-IRL | all at once | 240 | 20 | 30 | 9 | 1 | 7 | 19 of 32 | 0 | – | "
+        "–, – | 3.46 (-2.50, 9.00)",
     ]
 
 
@@ -316,3 +318,31 @@ def test_readable_ablations_by_hand() -> None:
         "Unified, without incorrect | Fᵢ (printed) | TRACE=none | 40.00 [38.00, 42.00] | 4.50 | "
         "39.5 | 2 of 30 | 1.00 [-0.50, 2.50]"
     ]
+
+
+def test_readable_means_by_hand() -> None:
+    """Keys have their names, counts a comma at the thousands, and what is missing is a dash."""
+    means = table(
+        "task method reading set iterations converged steps q_growth",
+        ("open-maze", "unified-incorrect", "updated", NAMED, 32.851, 1.0, 26832732.0, -0.0004),
+        ("soccer", "unified", "printed", NONE, 9.0, 0.5, NAN, 0.01),
+    )
+    readable = readable_means(means)
+    assert not any("_" in name for name in readable)
+    assert shown(readable) == [
+        "open maze | Unified, with incorrect | Fᵢ₊₁ (updated) | named kinds | 32.85 | 100% | "
+        "26,832,732 | 0.000",
+        "soccer | Unified, without incorrect | Fᵢ (printed) | – | 9.00 | 50% | – | 0.010",
+    ]
+
+
+def test_every_measure_has_a_name() -> None:
+    """What the claims are judged by, and what is shown of a trial, can be shown as means."""
+    assert {claim.measure for claim in load_claims().claim} <= set(MEASURES)
+
+
+def test_a_column_that_says_nothing_is_left_out() -> None:
+    """Where no trial is at the cap, no column says so."""
+    columns = "method reading choices n capped mean low high sd median more more_low more_high"
+    row = ("unified", "printed", "default", 30, 0, 40.0, 38.0, 42.0, 4.5, 39.5, 1.0, -0.5, 2.5)
+    assert "At the cap" not in readable_ablations(table(columns, row))

@@ -29,6 +29,7 @@ def project(toy_project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Set up a project with a notebook, its published outputs and a page of prose."""
     monkeypatch.setattr(build, "_generated", lambda out: {"verdicts": "all of them"})
     write_file(toy_project / "docs" / "conf.py", CONF)
+    write_file(toy_project / "docs" / "captions.toml", "")
     write_file(toy_project / "docs" / "index.md", INDEX.format(text="Some prose."))
     run_notebooks([write(toy_project)], profile="paper", out=toy_project / "figures")
     monkeypatch.setattr(execute, "execute", lambda *_, **__: pytest.fail("executed"))

@@ -11,7 +11,7 @@ import pytest
 from bs4 import BeautifulSoup
 from sphinx.errors import SphinxError
 
-from replication.site.extension import formula, improve_tables
+from replication.site.extension import HOLDS, formula, improve_tables, source_of
 
 
 def table(*rows: tuple[str, ...]) -> str:
@@ -50,6 +50,49 @@ def test_tables_sort_and_scroll_by_themselves() -> None:
     assert box["aria-label"] == "Table 1: claim n"
     assert box.table["class"] == ["sortable"]
     assert [cell["scope"] for cell in box.thead.find_all("td")] == ["col", "col"]
+
+
+def test_numbers_are_aligned() -> None:
+    """A column of numbers, and its head, stand at the right; one with words in it does not."""
+    rows = (
+        ("1.50 [1, 2]", "3 of 4: robust", "<svg></svg>"),
+        ("–", "1 of 4: fragile", "<svg></svg>"),
+    )
+    page = improved(("n", "said", "plot"), *rows)
+    for row in page.find_all("tr"):
+        kinds = [cell.get("class") == ["number"] for cell in row.find_all("td")]
+        assert kinds == [True, False, False]
+
+
+def test_intervals_are_not_broken() -> None:
+    """A line may end before an interval, not in it; the file has plain spaces."""
+    page = improved(("n", "m [95 %]"), ("1", "1.50 [1, 2]"), ("2", "–"))
+    assert page.tbody.find_all("td")[1].get_text() == "1.50 [1,\xa02]"
+    assert "1.50 [1, 2]" in unquote(page.find("a", class_="table-csv")["href"])
+
+
+def test_what_holds_has_a_bar() -> None:
+    """The share of specifications is drawn to scale, and cells know the head of their column."""
+    rows = (("a", "12 of 48: fragile"), ("b", "not tested"))
+    page = improved(("Claim", HOLDS), *rows)
+    assert page.table["class"] == ["sortable", "cards"]
+    first, second = (row.find_all("td")[1] for row in page.tbody.find_all("tr"))
+    assert first.find(class_="bar")["style"] == "--share: 25.0%"
+    assert first.get_text() == rows[0][1]
+    assert second.find(class_="bar") is None
+    assert [cell["data-label"] for cell in page.tbody.find_all("td")] == ["Claim", HOLDS] * 2
+    assert improved(("Claim", "n"), *rows).table["class"] == ["sortable"]
+
+
+def test_the_code_of_an_object_is_a_file() -> None:
+    """An address leads to the module's text and to the object; what is not ours has none."""
+    info = {"module": "replication.site.extension", "fullname": "formula"}
+    assert source_of("py", info) == (
+        "code/replication/site/extension.py.txt#:~:text=def%20formula&text=class%20formula"
+    )
+    package = source_of("py", {"module": "replication.site", "fullname": "x"}) or ""
+    assert package.startswith("code/replication/site/__init__.py.txt#")
+    assert source_of("py", {"module": "numpy", "fullname": "array"}) is None
 
 
 def test_tables_can_be_downloaded() -> None:

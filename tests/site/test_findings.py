@@ -5,12 +5,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import jinja2
+import pandas as pd
 import pytest
 
 from replication import files
+from replication.evidence.verdicts import ABSENT, INCONCLUSIVE, SHOWN
 from replication.files import write_file
 from replication.site import findings
-from replication.site.findings import TEMPLATE, render_findings
+from replication.site.findings import TEMPLATE, found, render_findings
 
 PAGE = "# Findings\n{% block answer -%}\n| {{ claim.verdict }} |\n{%- endblock %}\n{{ why }}\n"
 
@@ -46,3 +48,17 @@ def test_numbers_of_results_are_not_typed() -> None:
     text = (files.PROJECT / "docs" / TEMPLATE).read_text(encoding="utf-8")
     prose = re.sub(r"\{#.*?#\}|\{\{.*?\}\}|\{%.*?%\}|\]\(.*?\)", "", text, flags=re.DOTALL)
     assert set(re.findall(r"\d+\.\d+|\d+ ?%|\[-?\d", prose)) <= {"95 %"}
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "words"),
+    [
+        ((SHOWN, SHOWN), "shown"),
+        ((ABSENT, ABSENT), "absent"),
+        ((ABSENT, INCONCLUSIVE), "not shown"),
+        ((SHOWN, ABSENT, SHOWN), "shown in 2 of 3 cells"),
+    ],
+)
+def test_what_was_found_is_said_plainly(verdicts: tuple[str, ...], words: str) -> None:
+    """Cells that agree have one word; a claim that is shown in some of them says in how many."""
+    assert found(pd.DataFrame({"verdict": verdicts})) == words

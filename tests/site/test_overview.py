@@ -10,9 +10,8 @@ from replication.evidence.experiments import GENERAL, NAMED, NONE
 from replication.evidence.tables import read_table
 from replication.evidence.verdicts import ABSENT, NOT_TESTABLE, SHOWN, by_claim
 from replication.files import PROJECT
-from replication.paper.register import load_choices
 from replication.report.readable import sentence
-from replication.site.overview import choices, citation, interval_plot, published, verdicts
+from replication.site.overview import citation, interval_plot, published, verdicts
 from replication.site.pages import anchor
 
 
@@ -69,14 +68,14 @@ def judged(statistic: str = "saved") -> pd.DataFrame:
 
 def test_each_claim_has_its_verdicts_and_their_evidence() -> None:
     """Claims that compare are in one table, each with its sentence, which leads to its evidence."""
-    table = rows(verdicts(judged(), {"SAVES-OPEN": "9 of 48", "ERRS-SOCCER": "–"}))
+    table = rows(verdicts(judged(), {"SAVES-OPEN": (9, 48), "ERRS-SOCCER": (0, 0)}))
     assert [row[0] for row in table] == ["It saves", "It errs less"]
     said = "named kinds: absent under every reading; general list: shown under every reading"
     assert table[0][1] == f"[{said}](#{anchor('open_maze', 'contrasts')})"
-    assert table[1][1] == "[not testable: at the cap](figures/soccer/trials.csv)"
+    assert table[1][1] == "[not testable: at the cap](figures/soccer/trials.csv.xz)"
     assert [row[2] for row in table] == ["3.62 (Table I)", "(Table I)"]
     assert all(row[3].startswith("<svg") for row in table)
-    assert [row[4] for row in table] == ["9 of 48", "–"]
+    assert [row[4] for row in table] == ["9 of 48: **fragile**", "not tested"]
     (other,) = rows(published(judged()))
     assert other[0] == "SD"
 
@@ -88,12 +87,12 @@ def test_each_verdict_is_that_of_the_file() -> None:
         pytest.skip("figures/claims is not published yet")
     stored = read_table(path)
     compared = stored[~stored["statistic"].str.startswith("published")]
-    holds = {id: f"{at} of 48" for at, id in enumerate(stored["id"].unique())}
+    holds = {id: (at, 48) for at, id in enumerate(stored["id"].unique())}
     table = rows(verdicts(stored, holds))
     for row, (id, part) in zip(table, by_claim(compared), strict=True):
         assert row[0] == part["claim"].iloc[0]
         assert row[1].startswith(f"[{sentence(part)}](")
-        assert row[4] == holds[id]
+        assert row[4].startswith(f"{holds[id][0]} of 48: **")
     others = stored[stored["statistic"].str.startswith("published")]
     assert len(rows(published(stored))) == len(others[["id", "set"]].drop_duplicates())
 
@@ -184,19 +183,6 @@ def test_plots_have_words() -> None:
     )
     growth = plot([(4.0, 2.0, 6.0)], margin=math.nan)
     assert growth.get("aria-label") == "Fᵢ (printed), named kinds: 4 from 2 to 6."
-
-
-def test_every_choice_is_described() -> None:
-    """Each entry of the register has a row and a section that its id leads to."""
-    shares = pd.DataFrame({"claim": ["X", "Y"], "choice": ["ALPHA"] * 2, "share": [0.5, 0.01]})
-    text = choices(shares)
-    for entry in load_choices().values():
-        assert f"[{entry.id}](#choice-{entry.id.lower()})" in text
-        assert f"(choice-{entry.id.lower()})=\n\n### {entry.id}\n" in text
-        assert entry.open in text
-        assert entry.rule in text
-    matters = {row[0].partition("]")[0]: row[-1] for row in rows(text)}
-    assert (matters["[ALPHA"], matters["[BETA"]) == ("X (50 %)", "–")
 
 
 def test_citation_is_that_of_the_file() -> None:

@@ -11,7 +11,8 @@ from replication.paper.register import load_choices
 from replication.site.pages import Origin, anchor, link_choices, link_pages, page
 
 TABLE = "| a   | b   |\n| --- | --- |\n| 1   | 2   |\n"
-ORIGIN = Origin("toy", {"seed": 7, "trials": 3, "choices": {}, "jobs": 2}, 12.4, "Linux, 2 cores")
+PARAMETERS = {"seed": 7, "trials": 3, "choices": {}, "jobs": 2}
+ORIGIN = Origin("toy", PARAMETERS, {"fig06": "**Fig. 6.** All {trials} trials."})
 
 
 def shown(data: dict[str, str], **known: str) -> Any:
@@ -25,7 +26,8 @@ def folder(tmp_path: Path) -> Path:
     """Write outputs: a figure in three files, a table in two, a player in two."""
     names = ("fig05.png", "fig05.svg", "fig05.csv", "table1.csv", "film.html", "film.csv")
     for name in names:
-        (tmp_path / name).touch()
+        (tmp_path / name).write_text(name)
+    (tmp_path / "fig05.svg").write_text("larger than the other")
     return tmp_path
 
 
@@ -39,7 +41,7 @@ def made(folder: Path, *outputs: Any, code: str = "x") -> Any:
 
 
 def test_a_figure_is_described_and_traced(folder: Path) -> None:
-    """Its words are alternative text and caption; run, files, notebook and code stand below."""
+    """Its words are alternative text and caption; its numbers and its code stand below."""
     words, code = "d falls [to 0]\nat once", "replication.report.errors.draw"
     figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt=words, code=code)
     node = made(folder, figure)
@@ -49,11 +51,44 @@ def test_a_figure_is_described_and_traced(folder: Path) -> None:
     assert text.startswith(f"({anchor('toy', 'fig05')})=\n\n````")
     assert ":alt: d falls [to 0] at once\n" in text
     assert "\n\nd falls \\[to 0\\] at once\n\n" in text
-    assert "seed = 7, trials = 3 · the notebook ran 12 s on Linux, 2 cores" in text
-    for name in ("fig05.csv", "fig05.svg"):
-        assert f"<../figures/toy/{name}>`" in text
-    assert "`notebook <../source/toy.ipynb>`" in text
-    assert text.rstrip("`\n").endswith(f"code: {{py:func}}`~{code}")
+    assert "`CSV <../figures/toy/fig05.csv>`" in text
+    assert text.rstrip("`\n").endswith(f"{{py:func}}`code <{code}>")
+
+
+def test_a_caption_is_for_readers(folder: Path) -> None:
+    """A figure with a caption has that, with the numbers of the run; its words stay for the ear."""
+    for suffix in ("png", "svg"):
+        (folder / f"fig06.{suffix}").touch()
+    text = made(folder, shown({}, kind="figure", name="fig06", alt="d falls to 0")).cells[2].source
+    assert ":alt: d falls to 0\n" in text
+    assert "\n\n**Fig. 6.** All 3 trials.\n\n" in text
+
+
+@pytest.mark.parametrize(("png", "svg", "taken"), [("12", "123", "png"), ("123", "12", "svg")])
+def test_the_smaller_file_is_shown(folder: Path, png: str, svg: str, taken: str) -> None:
+    """A figure is shown as PNG or as SVG, whichever weighs less."""
+    for suffix, content in (("png", png), ("svg", svg)):
+        (folder / f"fig05.{suffix}").write_text(content)
+    figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt="it falls")
+    assert f"{{figure}} ../figures/toy/fig05.{taken}\n" in made(folder, figure).cells[2].source
+
+
+def test_where_a_page_comes_from_stands_once(folder: Path) -> None:
+    """The run and the notebook stand at the end of the page, and nowhere else."""
+    figure = shown({"image/png": "AAAA"}, kind="figure", name="fig05", alt="it falls")
+    cells = made(folder, figure, figure).cells
+    line = "Root seed 7, trials of each method 3, {download}`the notebook <../source/toy.ipynb>`"
+    assert [line in cell.source for cell in cells] == [False] * (len(cells) - 1) + [True]
+
+
+def test_code_that_shows_nothing_joins_what_follows(folder: Path) -> None:
+    """Cells of code one after the other are one, up to the one that shows something."""
+    cells = [new_markdown_cell("# Toy"), new_code_cell("a = 1"), new_code_cell("b = 2")]
+    cells[-1].outputs = [new_output("stream", name="stdout", text="hello")]
+    nbformat.write(new_notebook(cells=[*cells, new_code_cell("c")]), folder / "notebook.ipynb")
+    code = [each for each in page(folder / "notebook.ipynb", ORIGIN)["cells"] if "outputs" in each]
+    assert ["".join(each["source"]) for each in code] == ["a = 1\n\nb = 2", "c"]
+    assert len(code[0]["outputs"]) == 1
 
 
 def test_a_table_has_its_file(folder: Path) -> None:
@@ -93,12 +128,6 @@ def test_other_outputs_stay(folder: Path) -> None:
     assert node.cells[2].source == "**open:** [ALPHA](#choice-alpha)"
 
 
-def test_an_unknown_run_time_is_left_out(tmp_path: Path) -> None:
-    """Where no run is recorded, as in a fresh clone, no time is shown."""
-    line = Origin("toy", {"seed": 7}).line(tmp_path, "fig05")
-    assert line == "seed = 7 · {download}`notebook <../source/toy.ipynb>`"
-
-
 def test_every_choice_is_linked_once() -> None:
     """All ids of the register lead to their entry; longer ids, code and links are left alone."""
     for id in load_choices():
@@ -115,7 +144,8 @@ def test_every_choice_is_linked_once() -> None:
         ("../figures/claims/notebook.ipynb", "notebooks/claims.ipynb"),
         ("../figures/claims/verdicts.csv", "figures/claims/verdicts.csv"),
         ("../CITATION.cff", "CITATION.cff"),
-        ("choices.md#f-index", "choices.md#f-index"),
+        ("choices.md#f-index", "#choice-f-index"),
+        ("claims.md#cells", "claims.md#cells"),
     ],
 )
 def test_links_of_docs_lead_to_pages(link: str, target: str) -> None:
