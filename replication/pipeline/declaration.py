@@ -7,7 +7,7 @@ An example::
             "figures": ["fig05"],
             "tables": ["table1"],
             "players": ["player"],
-            "data": ["film.gif"],
+            "data": ["screen.csv"],
             "trials": true,
             "needs": [],
             "inputs": ["replication/paper/choices.toml"],

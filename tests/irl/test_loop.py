@@ -155,6 +155,15 @@ def test_larger_threshold_stops_earlier() -> None:
     assert trial.errors[-1] <= 0.5
 
 
+def test_an_error_that_is_the_threshold_is_small_enough() -> None:
+    """Converged means at most the threshold: with d_0 exactly 0.5 nothing is learned."""
+    episode, _ = Corridor().roll_out(np.zeros((5, 2)), np.zeros(4, np.uint64))
+    mu_e = feature_expectations(episode.states, episode.actions, gamma=GAMMA, shape=(5, 2))
+    mu_e[4, 0] = 0.5
+    trial = _trial(mu_e=mu_e, threshold=0.5)
+    assert (trial.errors.tolist(), trial.converged) == ([0.5], True)
+
+
 def test_snapshots_begin_before_and_end_after_learning() -> None:
     """Entry i of the snapshots is the state after i updates; they change nothing else."""
     plain, trial = _trial(), _trial(keep=True)
@@ -313,6 +322,9 @@ def test_random_start_weights_come_from_the_seed() -> None:
     assert (first > 0).all()
     assert (first < 0.001).all()
     np.testing.assert_array_equal(first, other.snapshots.weights[0])
+    third = np.random.SeedSequence(1).spawn(3)[2]  # the others are for learning and trajectories
+    due = np.random.default_rng(third).uniform(0, 0.001, size=(5, 2))
+    np.testing.assert_array_equal(first, due)
 
 
 def test_an_expert_matched_at_once_needs_no_iteration() -> None:

@@ -32,7 +32,7 @@ def test_reconstruction_is_labelled() -> None:
 
 def test_misspelt_method_is_refused_with_the_list() -> None:
     """An unknown name raises, suggests the nearest and lists the rest."""
-    with pytest.raises(ChoiceError, match=r"did you mean 'unified'.*adaboost"):
+    with pytest.raises(ChoiceError, match=r"^unknown method .*did you mean 'unified'.*adaboost"):
         get_method("unifed")
 
 
