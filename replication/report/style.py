@@ -80,12 +80,15 @@ def settled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 def save_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png", "svg")) -> list[Path]:
     """Write a figure as `path` with each of the suffixes; returns the files."""
-    metadata = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+    options: dict[str, dict[str, Any]] = {
+        "png": {"metadata": {"Software": None}, "pil_kwargs": {"optimize": True}},
+        "svg": {"metadata": {"Date": None, "Creator": None}},
+    }
     written = []
     for suffix in formats:
         buffer = io.BytesIO()
         with style():
-            figure.savefig(buffer, format=suffix, metadata=metadata[suffix])
+            figure.savefig(buffer, format=suffix, **options[suffix])
         written.append(write_file(path.with_suffix(f".{suffix}"), buffer.getvalue()))
     return written
 

@@ -23,11 +23,10 @@ from replication.pipeline.manifest import FRESH
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
 from replication.report.findings import held
-from replication.report.outputs import TRIALS
 from replication.site import extension, overview
 from replication.site.choices import choices
 from replication.site.findings import render_findings
-from replication.site.pages import Origin, link_pages, page
+from replication.site.pages import Origin, link_pages, packed, page
 
 PLACES = ("replication/**/*.toml", "data/demos/*.json", "*.cff", ".github/workflows/*.yml")
 """Files of the project that pages link to."""
@@ -134,7 +133,7 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
         yield path.relative_to(docs).as_posix(), read_file(path)
     for path in sorted(out.glob("[!.]*/[!.]*")):
         name = f"figures/{path.relative_to(out).as_posix()}"
-        if path.name == TRIALS:
+        if packed(path):
             yield f"{name}.xz", lzma.compress(read_file(path), preset=9)
         elif path.suffix != ".ipynb":
             yield name, read_file(path)

@@ -14,6 +14,10 @@ from typing import Any
 
 from replication.files import read_json
 from replication.paper.register import load_choices
+from replication.report.outputs import TRIALS
+
+LARGE = 100_000
+"""Bytes of a table above which the report has it compressed."""
 
 SHOWN = {"seed": "Root seed", "trials": "trials of each method", "choices": "choices"}
 """Parameters that a reader wants to know of a run, in words."""
@@ -48,9 +52,10 @@ class Origin:
 
     def links(self, folder: Path, name: str, code: str = "") -> str:
         """Return the links under an output: its numbers in `folder`, and its code."""
-        csv = f"figures/{self.notebook}/{name}.csv"
+        csv = folder / f"{name}.csv"
+        file = f"figures/{self.notebook}/{csv.name}"
         parts = [
-            _download("CSV", csv) if (folder / f"{name}.csv").exists() else "",
+            _download("CSV", f"{file}.xz" if packed(csv) else file) if csv.exists() else "",
             f"{{py:func}}`code <{code}>`" if code else "",
         ]
         return " · ".join(filter(None, parts))
@@ -59,6 +64,11 @@ class Origin:
         """Return the caption of a figure, or its words if it has none."""
         text = self.captions.get(name)
         return text.format(**self.parameters) if text else _escaped(words)
+
+
+def packed(path: Path) -> bool:
+    """Return whether the report has a file compressed: tables of trials, and other large ones."""
+    return path.name == TRIALS or (path.suffix == ".csv" and path.stat().st_size > LARGE)
 
 
 def _download(text: str, file: str) -> str:
