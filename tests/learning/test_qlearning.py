@@ -170,6 +170,19 @@ def test_inputs_are_not_modified(arrays: dict[str, Any]) -> None:
     assert all(same_bits(array, before[name]) for name, array in arrays.items())
 
 
+def test_type_and_layout_of_arguments_do_not_matter(arrays: dict[str, Any]) -> None:
+    """Small or unsigned integers, lists and any order in memory mean the same."""
+    whole = qlearning.learn(**arrays, **LEARN)
+    next_state, weights, q, words = arrays.values()
+    sparse = np.zeros(8, np.uint64)
+    sparse[::2] = words
+    for moves in (next_state.astype(np.uint8), np.asfortranarray(next_state), next_state.tolist()):
+        for kind in (np.asfortranarray, np.ndarray.tolist):
+            found = qlearning.learn(moves, kind(weights), kind(q), sparse[::2], **LEARN)
+            assert all(map(same_bits, found[:2], whole[:2]))
+            assert found[2:] == whole[2:]
+
+
 # --- arithmetic ------------------------------------------------------------------------------
 
 
@@ -399,6 +412,13 @@ def test_draws_are_those_of_the_published_generator() -> None:
     assert words == [41943041, 58720359, 3588806011781223, 3591011842654386]
 
 
+def test_exploration_ends_exactly_at_epsilon() -> None:
+    """The high half of a word explores below epsilon, and is greedy from there on."""
+    row = [0.0, 1.0]
+    taken = [reference.choose(row, high << 32, 0.5, True) for high in (2**31 - 1, 2**31)]
+    assert taken == [0, 1]
+
+
 def test_stream_is_never_all_zero() -> None:
     """A seed whose words are all 0, on which the generator would stick, still gives a stream."""
 
@@ -406,7 +426,7 @@ def test_stream_is_never_all_zero() -> None:
         def generate_state(self, n_words: int, dtype: Any = np.uint32) -> Array:
             return np.zeros(n_words, dtype)
 
-    assert stream(Zeros(0)).any()
+    assert same_bits(stream(Zeros(0)), np.ones(4, np.uint64))
     streams = np.array([make_stream(seed) for seed in range(100)])
     assert len(np.unique(streams)) == streams.size
 
@@ -421,14 +441,16 @@ def test_stream_is_never_all_zero() -> None:
         ({"next_state": np.full((25, 4), -1)}, "next_state must hold states from 0 to 24"),
         ({"weights": np.zeros((1, 25, 4))}, "weights must have the shape"),
         ({"weights": np.full((25, 4), np.nan)}, "weights must be finite"),
+        ({"weights": np.full((25, 4), 1e280)}, "weights must be finite and below"),
         ({"q": np.zeros((24, 4))}, "q must have the shape"),
         ({"q": np.full((25, 4), np.inf)}, "q must be finite"),
         ({"stream": np.ones(4)}, "stream must be uint64"),
         ({"stream": np.ones(3, np.uint64)}, "stream must be uint64"),
-        ({"stream": np.zeros(4, np.uint64)}, "stream must be uint64"),
+        ({"stream": np.zeros(4, np.uint64)}, r"^stream must be uint64 \[4\] and not all zero$"),
         ({"start": 25}, "start must be an integer from 0 to 24, not 25"),
         ({"start": 1.0}, "start must be an integer"),
         ({"goal": -1}, "goal must be an integer"),
+        ({"goal": 25}, "goal must be an integer from 0 to 24, not 25"),
         ({"goal": True}, "goal must be an integer"),
         ({"goal": np.True_}, "goal must be an integer"),
         ({"episodes": 0}, "episodes must be an integer from 1"),

@@ -49,7 +49,7 @@ def test_agents_refuse_the_other_kind_of_environment(
 
 def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
     """What the compiled maze learner cannot do is refused, not ignored."""
-    with pytest.raises(ChoiceError, match=r"epsilon_end = 0\.3"):
+    with pytest.raises(ChoiceError, match=r"^in mazes the exploration .*: set epsilon_end = 0\.3"):
         make_agent(small_demos.environment, Params.of(epsilon=0.3))
 
 

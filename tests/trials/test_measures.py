@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from replication import Demos, load_demos
+from replication import METHODS, Demos, Params, load_demos
 from replication.envs.maze import as_maze
 from replication.evidence.experiments import EXPERIMENTS, NONE, Key, conditions_of
 from replication.evidence.tables import read_table, write_csv
@@ -213,10 +213,10 @@ def test_visits_are_discounted_and_wrong_pairs_counted_once(small_demos: Demos) 
     right = (int(demo.states[0]), int(demo.actions[0]), False)
     (state, action), *_ = np.argwhere(kind_pairs(small_demos)["opposite"]).tolist()
     turn = (state, action, False)
-    episodes = (episode(turn, turn), episode(right, turn, turn), episode(turn, right))
+    episodes = (episode(turn, turn), episode(right, turn, turn), episode(turn, turn))
     found = measured(made(small_demos, iterations=2, episodes=episodes), small_demos)
     assert (found["wrong_pairs"], found["with_opposite"]) == (2, 2)
-    assert found["wrong_visits"] == found["visits_opposite"] == (0.5 + 0.25) + 1.0
+    assert found["wrong_visits"] == found["visits_opposite"] == (0.5 + 0.25) + (1.0 + 0.5)
 
 
 # --- growth ----------------------------------------------------------------------------------
@@ -391,6 +391,19 @@ def test_histories_are_read_back(conditions: dict[Key, Condition], results: Resu
     for row, trial in zip(histories, trials, strict=True):
         np.testing.assert_allclose(row[: trial.iterations + 1], trial.errors, rtol=1e-9)
         assert (row[trial.iterations :] == trial.errors[-1]).all()
+
+
+def test_a_history_that_ends_at_the_cap_stays_where_it_is() -> None:
+    """After its end a trial keeps its last error, also one above zero."""
+    found = error_histories(pd.DataFrame({"errors": ["2 0.5", "3 2 1 0"]}))
+    assert found.tolist() == [[2, 0.5, 0.5, 0.5], [3, 2, 1, 0]]
+
+
+def test_what_a_method_does_not_use_is_not_its_set(small_demos: Demos) -> None:
+    """A method without incorrect demonstrations has the set "none", whatever it is asked to use."""
+    params = Params.of(incorrect="hit")
+    sets = [factors(Condition(small_demos, name, params))["set"] for name in METHODS]
+    assert sets == ["none", "none", "hit"]
 
 
 def test_trials_survive_their_file(
