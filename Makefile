@@ -65,7 +65,7 @@ lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check th
 	done
 
 clean: ## remove build products and caches (not .venv)
-	rm -rf build figures/.runs.json *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build mutants figures/.runs.json *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -path './$(VENV)' -prune -o \
 	    \( -name __pycache__ -o -name .ipynb_checkpoints \) -type d -prune -exec rm -rf {} +
 

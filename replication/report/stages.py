@@ -102,7 +102,7 @@ def _maze(demos: Demos) -> Stage:
     for state, letter in ((maze.start, "S"), (maze.goal, "G")):
         ((x, y),) = points(np.array([state]), np.array([]))
         still.append(square(state, 'fill="#e69f00" fill-opacity=".45"'))
-        still.append(f'<text x="{x}" y="{y}" font-size="7">{letter}</text>')
+        still.append(f'<text x="{x}" y="{y}">{letter}</text>')
     still.append(f'<rect class="edge" width="{width}" height="{height}"/>')
     marks = {
         "columns": n_columns,
