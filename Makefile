@@ -18,7 +18,7 @@ help: ## list the targets
 	@echo 'The first target builds $(VENV) from environment.lock; PYTHON=python3.12 names its interpreter.'
 
 # The exit code is 1 if bytes differ from those that are published; the site is built all the same.
-reproduce: $(VENV)/.ready ## run everything in the paper, judge each claim, build the site
+reproduce: $(VENV)/.ready ## run the three tasks, judge each claim, build the site
 	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --here --check; status=$$?; \
 	    $(VENV)/bin/replicate site && exit $$status
 

@@ -194,7 +194,7 @@ profile_option = click.option(
     "--profile",
     type=click.Choice(["quick", "paper"]),
     default="paper",
-    help="The paper's number of trials, or a few.",
+    help="The published number of trials, or a few.",
 )
 
 

@@ -80,7 +80,9 @@ def _cross(panel: Axes, row: Any, colour: str, **style: Any) -> None:
 def _handles(final: pd.DataFrame, judged: pd.DataFrame, mean: float, sd: float) -> list[Artist]:
     rates = [handle(f"α = {rate:g}", "", colour, lw=3) for rate, colour in RATES.items()]
     starts = [handle(f"F₀ = {f:g}", mark, "0.3", mfc="w", lw=0) for f, mark in STARTS.items()]
-    rest = [handle("hollow: does not fit", "o", "0.3", mfc="w", lw=0)]
+    rest: list[Artist] = []
+    if final["fits"].any():
+        rest.append(handle("filled: fits", "o", "0.3", lw=0))
     for row in judged.head(1).itertuples():
         name = f"judging run, α = {row.alpha:g} ({row.n} trials)"
         rest.append(handle(name, STARTS[row.start], VERMILION, mfc="w", lw=1.8))

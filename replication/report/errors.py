@@ -37,7 +37,8 @@ def falling(trials: pd.DataFrame, published: Mapping[str, int], *, median: bool 
         every = error_histories(rows)
         trial = median_trial(rows["iterations"].to_numpy()) if median else TRACED_TRIAL
         quartiles = np.quantile(every, [0.25, 0.5, 0.75], axis=0)
-        at_zero = (every <= 0).sum(axis=0)
+        ends = rows["iterations"].where(rows["converged"] == 1, np.inf).to_numpy(float)
+        at_zero = (ends[:, None] <= np.arange(every.shape[1])).sum(axis=0)
         intervals = {k: share_interval(k, len(every)) for k in map(int, np.unique(at_zero))}
         paper = published.get(method, np.nan)
         part = pd.DataFrame(
@@ -69,7 +70,8 @@ def falling(trials: pd.DataFrame, published: Mapping[str, int], *, median: bool 
 
 def _in_words(part: pd.DataFrame, paper: float) -> str:
     """Say when half of the trials are at zero, and how many when the paper's curve is."""
-    text = f"half after {(part['at_zero'] < 0.5).sum()} iterations"
+    below = int((part["at_zero"] < 0.5).sum())
+    text = f"half after {below} iterations" if below < len(part) else "less than half in the end"
     if np.isnan(paper):
         return text
     return f"{text}, {100 * _share_at(part, paper):.0f} % after the paper's {paper:g}"
@@ -130,17 +132,17 @@ HEADS = (
 
 def _last(numbers: pd.DataFrame) -> float:
     """Return the iteration at which the last trial ends, or the paper's last curve."""
-    return float(numbers[["iteration", "paper"]].max().max())
+    return max(float(numbers[["iteration", "paper"]].max().max()), 1.0)
 
 
 def _last_error(numbers: pd.DataFrame) -> float:
     """Return the iteration from which all that is drawn of the errors is zero."""
     above = numbers[["error", "quartile_3"]].max(axis=1) > 0
-    return float(numbers.loc[above, "iteration"].max() + 1)
+    return float(numbers.loc[above, "iteration"].max() + 1) if above.any() else 1.0
 
 
 def _largest(numbers: pd.DataFrame) -> float:
-    return float(numbers[["error", "quartile_3"]].max().max())
+    return float(numbers[["error", "quartile_3"]].max().max()) or 1.0
 
 
 def _draw_shares(panel: Axes, look: Look, rows: pd.DataFrame) -> None:

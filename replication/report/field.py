@@ -212,8 +212,10 @@ def draw_ways(panel: Axes, numbers: pd.DataFrame) -> list[Line2D]:
     handles = [Line2D([], [], label=f"correct ({len(correct)})", **right)]
     colours = _colours(incorrect)
     demos = [(kind, demo) for kind, each in incorrect.items() for demo in each]
-    ways = [_branch(_way(demo), _way(correct[0])) for _, demo in demos]
-    for (kind, demo), way in zip(demos, _apart(ways, _way(correct[0])), strict=True):
+    every = [(each, _branch(_way(each[1]), _way(correct[0]))) for each in demos]
+    leaving = [(each, way) for each, way in every if len(way) > 1]
+    apart = _apart([way for _, way in leaving], _way(correct[0]))
+    for ((kind, demo), _), way in zip(leaving, apart, strict=True):
         _draw_incorrect(panel, demo, way, colours[kind])
     for kind, each in incorrect.items():
         style: dict[str, Any] = {"color": colours[kind], "marker": ">", "ms": 4}

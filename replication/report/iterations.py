@@ -26,7 +26,7 @@ from replication.report.drawing import SMALL, pad
 from replication.report.looks import KEY, Look, panels
 from replication.report.picture import Picture
 from replication.report.raincloud import OURS, PAPER, Array, draw_cloud, draw_mean, draw_paper
-from replication.report.readable import full_label, interval
+from replication.report.readable import full_label, interval, number
 from replication.report.style import canvas, legend_below, settled
 
 ALIKE = 0.1
@@ -68,7 +68,7 @@ def _saved(rows: pd.DataFrame, baseline: pd.DataFrame) -> Array:
 def _in_words(part: pd.DataFrame) -> str:
     """Say the mean and SD of a condition's trials, and what they save."""
     own = summarise(part["iterations"], part["converged"])
-    text = f"mean {own.mean:.1f} (SD {own.sd:.1f})"
+    text = f"mean {own.mean:.1f} (SD {number(own.sd)})"
     if own.capped:
         text = f"{own.capped} of {own.n} trials at the cap"
     if part["saved"].isna().all():

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from replication.demos.model import Demos
 from replication.evidence.experiments import NONE, Key
 from replication.irl import READINGS, Trial, get_method
-from replication.irl.expectations import visited
 from replication.report.moving import Player, key_entry, path, player_page
 from replication.report.readable import F_LABELS, SET_LABELS
 from replication.report.stages import EXPERT, Stage, stage
+from replication.trials.measures import marked_pairs
 
 Floats = NDArray[np.float64]
 
@@ -43,10 +43,15 @@ def keys(reading: str, set: str) -> tuple[Key, Key]:
 
 
 def differences(trials: pd.DataFrame, reading: str, set: str) -> pd.Series:
-    """Return how many iterations each trial saves with incorrect demonstrations, by its number."""
+    """Return how many iterations each trial saves with incorrect demonstrations, by its number.
+
+    Trials at the cap count only where no pair ends before it.
+    """
     rows = trials.set_index(["method", "reading", "set", "trial"]).sort_index()
-    without, given = (rows.loc[key, "iterations"] for key in keys(reading, set))
-    return (without - given).dropna()
+    without, given = (rows.loc[key] for key in keys(reading, set))
+    saved = (without["iterations"] - given["iterations"]).dropna()
+    ended = (without["converged"] * given["converged"]).reindex(saved.index) == 1
+    return saved[ended] if ended.any() else saved
 
 
 def typical_trials(saved: pd.Series) -> dict[str, int]:
@@ -97,6 +102,8 @@ def learning(
             if part == "median":
                 without, given = (len(each) - 1 for each in runs)
                 medians.append(f"{F_LABELS[reading]}: {without} without and {given} with")
+    pairs = marked_pairs(demos.select(set))[None].astype(float)
+    marked = np.flatnonzero(place.weights(pairs)).tolist()
     content = {
         "title": "The agent learning, without and with incorrect demonstrations",
         "unit": "iteration",
@@ -105,7 +112,7 @@ def learning(
         "view": place.view,
         "still": place.still,
         "movers": ['<path class="dot" d="M0 0h0"/>'],
-        "marks": {**place.marks, "levels": LEVELS, "marked": _marked(place, demos.select(set))},
+        "marks": {**place.marks, "levels": LEVELS, "marked": marked},
         "chart": "error d (square-root scale) after each iteration",
         "key": _key(place),
         "choices": [
@@ -140,14 +147,6 @@ def _numbers(place: Stage, key: Key, k: int, trial: Trial) -> tuple[pd.DataFrame
         }
     )
     return table, place.weights(trial.snapshots.weights)
-
-
-def _marked(place: Stage, demos: Demos) -> list[int]:
-    """Return the places that an incorrect demonstration visits, and no correct one."""
-    environment = demos.environment
-    shape = environment.n_states, environment.n_actions
-    wrong, right = (visited(one, shape=shape) for one in (demos.incorrect, demos.correct))
-    return np.flatnonzero(place.weights((wrong & ~right)[None].astype(float))).tolist()
 
 
 def _with_rewards(runs: list[tuple[pd.DataFrame, Floats]]) -> list[pd.DataFrame]:

@@ -25,7 +25,7 @@ F_LABELS = {
 }
 """How a reading of Eq. 9 is called in tables and figures; a method without a trace has none."""
 
-SET_LABELS = {NONE: "–", NAMED: "named kinds", GENERAL: "general list", "all": "all four kinds"}
+SET_LABELS = {NONE: "–", NAMED: "named kinds", GENERAL: "general list", "all": "all kinds"}
 """How the judged sets of incorrect demonstrations are called; others have their kinds as name."""
 
 Form = Callable[[Any], object]

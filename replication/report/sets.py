@@ -56,9 +56,10 @@ def savings(table: pd.DataFrame, published: Mapping[str, Published]) -> Picture:
 def _alike(numbers: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Yield the name and the rows of each set; of sets that save just the same, those of one."""
     groups: dict[Any, list[pd.DataFrame]] = {}
-    for _, own in numbers.sort_values("leaving", kind="stable").groupby("set", sort=False):
-        effects = own[["saved", "low", "high"]].round(9).to_numpy().tobytes()
-        groups.setdefault(effects, []).append(own)
+    for name, own in numbers.sort_values("leaving", kind="stable").groupby("set", sort=False):
+        effects = own[["saved", "low", "high"]].round(9)
+        unknown = bool(effects["saved"].isna().any())
+        groups.setdefault(name if unknown else effects.to_numpy().tobytes(), []).append(own)
     for alike in groups.values():
         yield "\n".join(_name(own.iloc[0]) for own in alike), alike[0]
 
@@ -74,7 +75,8 @@ def draw(numbers: pd.DataFrame) -> Figure:
     """Draw a row for each set with what it saves and its interval, and the paper's saving."""
     rows = list(_alike(numbers))
     readings = list(dict.fromkeys(numbers["reading"]))
-    height = max(1.3 + 0.3 * len(rows), 2.2)
+    lines = sum(name.count("\n") + 1 for name, _ in rows)
+    height = max(1.3 + 0.26 * lines, 2.2)
     figure, axes = canvas(1, len(readings), height=height, sharex=True, sharey=True)
     for panel, reading in zip(axes, readings, strict=True):
         for y, (_, own) in enumerate(rows):

@@ -136,9 +136,9 @@ def _draw_lines(figure: Figure, numbers: pd.DataFrame) -> None:
     _draw_growth(panel, by, readings)
     panel.set_title(f"({'efg'[len(readings)]}) growth of Q, with 95 % interval", size=8.5)
     for each in (*levels, panel):
-        last = rows["step"].max()
+        last = max(int(rows["step"].max()), 1)
         each.set_xlim(0, last)
-        each.set_xticks([*range(0, int(last) - 3, 10), int(last)])
+        each.set_xticks([*range(0, last - 3, 10), last])
         each.tick_params(labelsize=7, length=2)
         each.set_xlabel("step on the expert's path", size=8, labelpad=2)
 

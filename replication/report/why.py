@@ -46,7 +46,8 @@ def why(
         The demonstrations, with the correct path.
     """
     maze = as_maze(demos.environment)
-    episode = trials[SHOWN].episodes[1]
+    trial = trials[SHOWN]
+    episode = trial.episodes[min(1, trial.iterations)]  # the first may be right by chance
     path_x, path_y = places(maze, demos.correct[0].states)
     moves = _moves(maze, episode, demos)
     parts = [
@@ -75,6 +76,7 @@ def _moves(maze: Maze, episode: Episode, demos: Demos) -> pd.DataFrame:
     (states, actions), counts = (part.T for part in np.unique(pairs, axis=0, return_counts=True))
     shape = maze.n_states, maze.n_actions
     known = {"correct": visited(demos.correct, shape=shape), **kind_pairs(demos)}
+    known = {kind: marked for kind, marked in known.items() if kind in MARKED}
     kinds = [
         next((kind for kind, marked in known.items() if marked[pair]), "unmarked")
         for pair in zip(states, actions, strict=True)

@@ -1,6 +1,6 @@
 """The findings in words: ``docs/findings.md.jinja`` with the numbers of the published tables.
 
-The template picks rows of tables by their keys, and rounds by the filters at the end of this file.
+The template picks rows of tables by keys, and rounds by the filters at the end.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import pandas as pd
 from replication import files
 from replication.evidence.claims import LABELS, label, load_claims
 from replication.evidence.experiments import GENERAL, NAMED
+from replication.evidence.sweep import trace_gain
 from replication.evidence.tables import read_table
 from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, SHOWN, by_claim
 from replication.report.findings import (
@@ -40,7 +41,7 @@ TEMPLATE = "findings.md.jinja"
 def render_findings(figures: Path) -> tuple[str, str]:
     """Return the page of findings, and the rows of its answer, as Markdown.
 
-    A name that the template uses and the numbers lack raises `jinja2.UndefinedError`.
+    A name in the template that the numbers lack raises `jinja2.UndefinedError`.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(files.PROJECT / "docs"),
@@ -60,7 +61,7 @@ def render_findings(figures: Path) -> tuple[str, str]:
 
 
 def numbers(figures: Path) -> dict[str, Any]:
-    """Return what the template is given: rows of the tables below `figures`, and a few sums."""
+    """Return what the template is given: rows of tables below `figures`, and some sums."""
 
     def read(name: str) -> pd.DataFrame:
         return read_table(figures / f"{name}.csv")
@@ -72,6 +73,7 @@ def numbers(figures: Path) -> dict[str, Any]:
     in_general = compared["id"].isin(["SAVES-OPEN", "SAVES-OBSTACLES"]) & (
         compared["set"] == GENERAL
     )
+    ablated = read("sensitivity/trials").query("part == 'ablations'")
     levels, pairs = read("sensitivity/levels"), read("sensitivity/numbers")
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
     opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
@@ -123,6 +125,7 @@ def numbers(figures: Path) -> dict[str, Any]:
         "rounding": by_key(
             read("rounding/rounding"), "task", "method", "reading", "tolerance", "arithmetic"
         ),
+        "no_trace_updated": trace_gain(ablated, read("sensitivity/ablations")),
         "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
         "general_size": _consistency(compared[in_general]),
         "set_labels": SET_LABELS,

@@ -477,7 +477,7 @@ def test_a_claim_without_any_effect_keeps_its_rows() -> None:
     missing.loc[row, "verdict"] = NOT_TESTABLE
     (panel,) = drawn(verdicts.verdicts(missing[row])).axes
     assert [text.get_text() for text in beside(panel, 1)][-4:] == ["–", "–", "–", NOT_TESTABLE]
-    assert beside(panel, 0)[-1].get_text() == "soccer, all four kinds"
+    assert beside(panel, 0)[-1].get_text() == "soccer, all kinds"
 
 
 def test_every_comparative_claim_has_a_unit() -> None:

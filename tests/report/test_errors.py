@@ -139,3 +139,15 @@ def test_words_hold_the_numbers(trials: pd.DataFrame) -> None:
     share = 100 * (counts <= paper).mean()
     due = f"half after {half} iterations, {share:.0f} % after the paper's {paper}"
     assert f"Unified, without incorrect, Fᵢ₊₁ (updated): {due}" in words
+
+
+def test_trials_end_where_they_say() -> None:
+    """A trial counts from its last iteration if it converged, above zero too; at the cap, never."""
+    ends = [("3 0.05", 1, 1), ("3 2 1", 2, 0), ("0", 0, 1)]
+    rows = pd.DataFrame(ends, columns=["errors", "iterations", "converged"])
+    trials = rows.assign(method="unified", reading="printed", set=NONE, trial=rows.index)
+    assert falling(trials, {}).numbers["at_zero"].tolist() == [1 / 3, 2 / 3, 2 / 3]
+    capped, right = falling(trials.iloc[1:2], {}), falling(trials.iloc[2:], {})
+    assert "less than half in the end" in capped.words
+    for picture in (capped, right):
+        assert_legible(picture.draw(picture.numbers))

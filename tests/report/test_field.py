@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -76,6 +77,17 @@ def test_contacts_are_crossed(drawing: Figure, soccer_demos: Demos) -> None:
     ends = [replay(FIELD, demo.actions).iloc[-1][["x", "y"]].astype(float) for demo in hits]
     drawn = [np.ravel(line.get_xydata()) for line in crosses]
     assert all(any(np.allclose(end, place) for place in drawn) for end in ends)
+
+
+def test_a_way_that_never_leaves_the_right_one_is_not_drawn(soccer_demos: Demos) -> None:
+    """A mistake that is to stop on the way is counted, and has nothing to be drawn from."""
+    (right,) = soccer_demos.correct
+    stops = replace(
+        right, name="s", kind="stops", states=right.states[:6], actions=right.actions[:5]
+    )
+    picture = demonstrations(replace(soccer_demos, incorrect=(stops,)))
+    texts = picture.draw(picture.numbers).legends[0].get_texts()
+    assert "stops (1)" in [text.get_text() for text in texts]
 
 
 def test_words_hold_the_facts(soccer_demos: Demos) -> None:

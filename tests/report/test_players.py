@@ -91,6 +91,14 @@ def test_each_reading_shows_the_trials_of_its_own_differences(
     }
 
 
+def test_a_trial_at_the_cap_saves_nothing_that_is_known(trials: pd.DataFrame) -> None:
+    """Its pair is left out, unless no pair is left."""
+    usual = players.differences(trials, "updated", GENERAL)
+    first = trials.assign(converged=(trials["trial"] != 0).astype(int))
+    assert players.differences(first, "updated", GENERAL).equals(usual.drop(0))
+    assert players.differences(trials.assign(converged=0), "updated", GENERAL).equals(usual)
+
+
 def test_differences_are_paired_by_trial(trials: pd.DataFrame) -> None:
     """What a trial saves is its own iterations without less those with, in whatever order."""
     mixed = trials.sample(frac=1, random_state=1)
@@ -212,6 +220,7 @@ def test_demonstrations_without_mistakes_have_a_player(small_demos: Demos) -> No
 
     rows = [
         {"method": key[0], "reading": key[1], "set": key[2], "trial": 0, "iterations": 3}
+        | {"converged": 1}
         for key in conditions
     ]
     player = players.learning(demos, pd.DataFrame(rows), replayed, set=key[2])

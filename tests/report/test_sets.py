@@ -49,6 +49,12 @@ def test_sets_that_save_the_same_are_one_row() -> None:
     assert labels == ["named kinds (7)\nhits (7)", "opposite direction (30)"]
 
 
+def test_sets_without_an_effect_are_not_taken_for_the_same() -> None:
+    """What has trials at the cap has no effect: nobody knows whether it saves the same."""
+    left, _ = draw(savings(SAVED.assign(saved=np.nan, low=np.nan, high=np.nan), {}).numbers).axes
+    assert len(left.get_yticklabels()) == 3
+
+
 def test_the_papers_saving_is_marked_where_it_is_known() -> None:
     """A line stands at the paper's difference of means, with its number, in every panel."""
     for published, due in ((TABLE_1, ["paper: 3.62"]), ({}, [])):
