@@ -28,7 +28,7 @@ from replication.evidence.specifications import DEFAULT, named_choices
 from replication.evidence.verdicts import INCONCLUSIVE, NOT_TESTABLE, SHOWN
 from replication.irl import METHODS
 from replication.paper.register import load_choices
-from replication.report.choices import NAMES
+from replication.report.choices import NAMES, value
 from replication.report.readable import F_LABELS, full_label
 
 MATTERS = 0.05
@@ -227,8 +227,8 @@ def _by_value(levels: pd.DataFrame, part: pd.DataFrame, claim: str, choice: str)
     for row in rows.sort_values("holds", ascending=False, kind="stable").itertuples():
         level = part[values == row.value]
         always = " (always at the cap)" if (level["capped"] >= level["n"]).all() else ""
-        texts.append(f"{row.value} {row.holds:.0%}{always}")
-    return ", ".join(texts)
+        texts.append(f"{value(choice, row.value)}: {row.holds:.0%}{always}")
+    return "; ".join(texts)
 
 
 STEADY = 0.9

@@ -179,7 +179,7 @@ def test_claims_are_counted_with_and_without_caps() -> None:
         "AdaBoost-IRL; it holds in 1 of the 40 others. It depends most on the rule of "
         "AdaBoost-IRL: 100% of the variance of the effect, "
     )
-    assert faster.endswith("It holds with graded 100% (always at the cap), mismatch 2%.")
+    assert faster.endswith("It holds with graded: 100% (always at the cap); mismatch: 2%.")
     assert "; every trial of the other method reaches zero, in every specification." in reaches
 
 
