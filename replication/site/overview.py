@@ -22,6 +22,7 @@ from replication.report.readable import (
     readable_verdicts,
     sentence,
 )
+from replication.site.extension import HOLDS
 from replication.site.pages import anchor
 
 WIDTH, MARGIN, LINE = 190, 6, 10
@@ -56,7 +57,7 @@ def verdicts(judged: pd.DataFrame, holds: Mapping[str, tuple[int, int]]) -> str:
                 "Verdict": f"[{sentence(part)}]({shown})",
                 "Paper": f"{paper} ({first['place']})".removeprefix("– "),
                 "Effects, with 95 % intervals": interval_plot(part),
-                "Holds with other choices": word,
+                HOLDS: word,
             }
         )
     return markdown(pd.DataFrame(rows))
