@@ -17,9 +17,13 @@ FOLDER = Path(__file__).resolve().parent
 PACKAGE = FOLDER.name
 
 SILENT = frozenset(
-    f"{PACKAGE}.{name}" for name in ("demos.checks", "errors", "irl.methods", "source")
+    f"{PACKAGE}.{name}"
+    for name in (
+        *("demos.checks", "errors", "irl.methods", "source", "trials.agents"),
+        *("paper.params", "paper.register"),  # the values of parameters are part of the key
+    )
 )
-"""Modules that change no trial: they check, phrase messages, list methods, or hash."""
+"""Modules that change no trial: they check, phrase messages, list methods or values, or hash."""
 
 
 @cache

@@ -128,7 +128,7 @@ def test_bare_source_has_no_prose(text: str, bare: str) -> None:
 
 
 KEY = (
-    *("replication.trials.compute", "replication.trials.maze_agent"),
+    *("replication.trials.compute", "replication.trials.table_agent"),
     *("replication.irl.unified", "replication.irl.adaboost"),
 )
 """What the keys of trials in a maze hash, together with what these modules import."""

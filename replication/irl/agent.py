@@ -1,7 +1,7 @@
 """What the IRL loop needs of an agent: Q from reward weights, and a greedy episode from Q.
 
 A new kind of task needs a class with these two methods, in its own module, see
-:mod:`replication.trials.condition`; the loop and the methods stay as they are.
+:mod:`replication.trials.agents`; the loop and the methods stay as they are.
 """
 
 from __future__ import annotations

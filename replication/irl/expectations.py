@@ -66,22 +66,25 @@ def feature_expectations(
     return mu
 
 
-def expert_expectations(
-    demos: Iterable[Trajectory], *, gamma: float, shape: tuple[int, int]
+def mean_expectations(
+    trajectories: Iterable[Trajectory], *, gamma: float, shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return mu_E [state, action], the mean over the correct demonstrations (Eq. 5).
+    """Return the mean feature expectations [state, action] of some trajectories.
 
-    Equal demonstrations are weighted, not added up, so that any number of them has the bits of one:
-    rounding alone would otherwise keep d from reaching zero.
+    That is mu_E of the correct demonstrations (Eq. 5), and mu_i of the agent's trajectories (Eq. 7,
+    choice ROLLOUTS). Equal trajectories are weighted, not added up, and all are taken in an order of
+    their own: so the same share of each has the same bits, in whatever number and order they come.
+    Rounding alone would otherwise keep d from reaching zero.
     """
     counts: dict[tuple[bytes, bytes], int] = {}
     each: dict[tuple[bytes, bytes], NDArray[np.float64]] = {}
-    for demo in demos:
-        key = demo.states.tobytes(), demo.actions.tobytes()
+    for way in trajectories:
+        key = way.states.tobytes(), way.actions.tobytes()
         counts[key] = counts.get(key, 0) + 1
-        each[key] = feature_expectations(demo.states, demo.actions, gamma=gamma, shape=shape)
+        if key not in each:
+            each[key] = feature_expectations(way.states, way.actions, gamma=gamma, shape=shape)
     total = sum(counts.values())
-    return np.sum([counts[key] / total * mu for key, mu in each.items()], axis=0)
+    return np.sum([counts[key] / total * each[key] for key in sorted(each)], axis=0)
 
 
 def visited(demos: Iterable[Trajectory], *, shape: tuple[int, int]) -> NDArray[np.bool_]:

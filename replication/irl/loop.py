@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.irl.agent import Agent, Episode
-from replication.irl.expectations import feature_expectations, norm
+from replication.irl.expectations import mean_expectations, norm
 from replication.irl.methods import Method
 from replication.learning.seeds import child, stream
 from replication.paper.params import Params
@@ -36,13 +36,16 @@ class Trial:
     errors
         d_0 ... d_n (Eq. 6), one for each trajectory of the agent; n is the number of iterations.
     converged
-        Whether the last error is within the threshold; otherwise the trial ended at the cap.
+        Whether the last error is within the threshold; otherwise the trial ended at the cap or, if
+        it is asked for, on a plateau (choice PLATEAU).
     steps
         Learning steps in the environment, over all iterations.
     weights, q
-        The last reward weights and Q-table, `[state, action]`.
+        The last reward weights and Q-table, `[state, action]`; if a plateau may end the trial,
+        those of its least error.
     episodes
-        The agent's trajectory before each update and after the last one; as many as errors.
+        The agent's trajectory before each update and after the last one; as many as errors. Of
+        several (choice ROLLOUTS) the first.
     collisions
         Steps that ran into a wall or an obstacle while learning after each update,
         int64 [iteration].
@@ -116,20 +119,25 @@ def run_trial(
     rewards: list[NDArray[np.float32]] = []
     kept: list[tuple[Array, Array]] = []
     on_path = np.flatnonzero(mu_e.any(axis=1))
+    nearest = w, q
     steps = 0
     for i in range(params.loop.max_iterations + 1):
-        episode, rolling = agent.roll_out(q, rolling)
-        mu_i = feature_expectations(
-            episode.states, episode.actions, gamma=params.learner.gamma, shape=agent.shape
-        )  # Eq. 7
+        rolled: list[Episode] = []
+        for _ in range(params.loop.rollouts):
+            episode, rolling = agent.roll_out(q, rolling)
+            rolled.append(episode)
+        mu_i = mean_expectations(rolled, gamma=params.learner.gamma, shape=agent.shape)  # Eq. 7
         errors.append(norm(mu_e - mu_i))  # Eq. 6
-        episodes.append(episode)
+        episodes.append(rolled[0])
         values.append(q[on_path].max(axis=1).astype(np.float32))
         rewards.append(w[on_path].max(axis=1).astype(np.float32))
         if keep:
             kept.append((w, q))
         converged = errors[-1] <= params.loop.threshold
-        if converged or i == params.loop.max_iterations:
+        least = int(np.argmin(errors))
+        if least == i or not params.loop.plateau:
+            nearest = w, q
+        if converged or i == params.loop.max_iterations or 0 < params.loop.plateau <= i - least:
             break
         w, memory = method.update(w, memory, mu_e, mu_i, seen, params.update)
         if params.loop.w_norm == "unit":
@@ -146,8 +154,7 @@ def run_trial(
         np.array(errors),
         converged,
         steps,
-        w,
-        q,
+        *nearest,
         tuple(episodes),
         np.array(collisions, np.int64),
         np.array(values),

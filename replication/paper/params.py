@@ -1,7 +1,7 @@
 """Parameters of the replication: one frozen dataclass for each concern.
 
 Every field is a choice in the register, see :mod:`replication.paper.register`, which holds its
-default, the reason for it and the accepted values.
+default, the reason for it and what else is accepted.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ class Learner(Chosen):
     epsilon_end: float = choice("EPSILON-END")  # the same in the last episode; linear in between
     episodes: int = choice("EPISODES")  # in each iteration
     horizon: int = choice("HORIZON")  # steps after which an episode is cut
+    solver: str = choice("SOLVER")  # what finds Q in each iteration
     q_start: str = choice("Q-START")  # whether Q is kept or reset in each iteration
     ties: str = choice("TIES")  # which of equally good actions is taken while learning
     tie_tolerance: float = choice("TIE-TOLERANCE")  # relative difference up to which values tie
@@ -44,8 +45,10 @@ class Loop(Chosen):
 
     threshold: float = choice("THRESHOLD")  # converged if d is at most this
     max_iterations: int = choice("ITERATION-CAP")  # weight updates before giving up
+    plateau: int = choice("PLATEAU")  # iterations without a smaller d that end a trial
     w_start: str = choice("W-START")  # reward weights before the first iteration
     w_norm: str = choice("W-NORM")  # whether their norm is kept at 1
+    rollouts: int = choice("ROLLOUTS")  # trajectories behind each expectation (Eq. 7)
     rollout_ties: str = choice("ROLLOUT-TIES")  # which of equally good actions the trajectory takes
 
 
@@ -76,7 +79,7 @@ class Params:
         Raises
         ------
         ChoiceError
-            If a name is unknown or a value is not registered.
+            If a name is unknown or a value is not accepted.
 
         Examples
         --------

@@ -1,7 +1,8 @@
 """The register of choices: what the paper leaves open, what we chose, and what else is accepted.
 
 The register itself is the data file ``choices.toml``. A dataclass field declared with
-:func:`choice` takes its default from the register and accepts exactly the registered values.
+:func:`choice` takes its default from the register and accepts every number that the mathematics
+allow, and the registered words; `Choice.is_registered` tells what is compared with the paper.
 """
 
 from __future__ import annotations
@@ -46,13 +47,17 @@ class Choice:
             return f"{kind} from {low} to {high}"
         return ", ".join(repr(value) for value in (self.default, *self.alternatives))
 
+    def is_registered(self, value: Value) -> bool:
+        """Return whether a value is compared with the paper: the default, or one of the others."""
+        return value == self.default or value in self.alternatives or not self.alternatives
+
     def check(self, value: Any) -> Value:
         """Return `value` in the type of the default.
 
         Raises
         ------
         ChoiceError
-            If the register does not accept the value.
+            If it is outside the range, or not one of the registered words.
         """
         kind = type(self.default)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)

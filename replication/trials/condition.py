@@ -4,40 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 
 import numpy as np
 
 from replication.demos.model import Demos, content_hash
-from replication.envs.environment import Environment
-from replication.errors import unknown
 from replication.irl.agent import Agent
-from replication.irl.expectations import expert_expectations, visited
+from replication.irl.expectations import mean_expectations, visited
 from replication.irl.loop import Trial, run_trial
 from replication.irl.methods import Method, get_method
 from replication.paper.params import Params
-from replication.paper.register import ChoiceError
-
-AGENTS = {"maze": "replication.trials.maze_agent", "soccer": "replication.trials.soccer_agent"}
-"""The module that makes the agent for each kind of environment.
-
-They are named, not imported, so that the key of a trial covers the code of its own task only.
-"""
-
-
-def make_agent(environment: Environment, params: Params) -> Agent:
-    """Return the agent that learns in `environment`.
-
-    Raises
-    ------
-    ChoiceError
-        If there is no such agent, or it cannot do what the parameters ask for.
-    """
-    if environment.kind not in AGENTS:
-        raise ChoiceError(unknown(environment.kind, AGENTS, "kind of environment"))
-    agent: Agent = import_module(AGENTS[environment.kind]).make_agent(environment, params)
-    return agent
-
+from replication.trials.agents import make_agent
 
 @dataclass(frozen=True)
 class Condition:
@@ -83,11 +59,6 @@ class Condition:
         """The method itself."""
         return get_method(self.method)
 
-    @property
-    def choices(self) -> str:
-        """The registered choices that differ from the defaults: `ID=value`, separated by blanks."""
-        return " ".join(f"{id}={value}" for id, value in self.params.differences().items())
-
     @cached_property
     def agent(self) -> Agent:
         """The agent that learns in the environment."""
@@ -96,6 +67,6 @@ class Condition:
     def trial(self, *, seed: np.random.SeedSequence, keep: bool = False) -> Trial:
         """Run one trial, see :func:`replication.irl.run_trial`."""
         shape, gamma = self.agent.shape, self.params.learner.gamma
-        mu_e = expert_expectations(self.selected.correct, gamma=gamma, shape=shape)
+        mu_e = mean_expectations(self.selected.correct, gamma=gamma, shape=shape)
         mu_b = visited(self.selected.incorrect, shape=shape)
         return run_trial(self.agent, self.rule, mu_e, mu_b, self.params, seed=seed, keep=keep)

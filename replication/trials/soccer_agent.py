@@ -34,6 +34,8 @@ class SoccerAgent:
     def __post_init__(self) -> None:
         if self.learner.arithmetic != "double":
             raise ChoiceError('in soccer all operations are rounded: set arithmetic = "double"')
+        if self.learner.solver != "q-learning":
+            raise ChoiceError('soccer has no table to plan on: set solver = "q-learning"')
 
     def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
         """Learn by Q-learning, see :func:`replication.learning.soccer.learn`."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from replication import Demos
-from replication.irl.expectations import expert_expectations, feature_expectations, visited
+from replication.irl.expectations import mean_expectations, feature_expectations, visited
 
 SHAPE = (5, 3)
 PAIRS = st.lists(st.tuples(st.integers(0, 4), st.integers(0, 2)), max_size=30)
@@ -94,12 +94,12 @@ def test_last_state_is_optional() -> None:
 
 
 @given(st.lists(PAIRS, min_size=1, max_size=5), GAMMAS)
-def test_expert_expectations_are_the_mean(ways: list[list[tuple[int, int]]], gamma: float) -> None:
+def test_mean_expectations_are_the_mean(ways: list[list[tuple[int, int]]], gamma: float) -> None:
     """Eq. 5: the sum over the demonstrations, divided by their number; one has its own bits."""
-    found = expert_expectations([way(pairs) for pairs in ways], gamma=gamma, shape=SHAPE)
+    found = mean_expectations([way(pairs) for pairs in ways], gamma=gamma, shape=SHAPE)
     due = sum((mu(pairs, gamma) for pairs in ways), np.zeros(SHAPE)) / len(ways)
     np.testing.assert_allclose(found, due, rtol=1e-12, atol=1e-300)
-    alone = expert_expectations([way(ways[0])], gamma=gamma, shape=SHAPE)
+    alone = mean_expectations([way(ways[0])], gamma=gamma, shape=SHAPE)
     assert alone.tobytes() == mu(ways[0], gamma).tobytes()
 
 
@@ -119,7 +119,7 @@ def test_stored_demonstrations(stored_demos: Demos) -> None:
     """A stored correct demonstration visits a pair a step, none twice, by falling discounts."""
     maze, (correct,) = stored_demos.environment, stored_demos.correct
     shape = (maze.n_states, maze.n_actions)
-    found = expert_expectations([correct], gamma=0.9, shape=shape)
+    found = mean_expectations([correct], gamma=0.9, shape=shape)
     steps = np.argsort(-found, axis=None)[: len(correct.actions)]
     assert (np.count_nonzero(found)) == len(correct.actions)
     assert [divmod(int(k), 4) for k in steps] == list(

@@ -12,14 +12,15 @@ from replication import Demos
 from replication.irl import Trial, get_method, run_trial
 from replication.irl.agent import Agent, Episode
 from replication.irl.expectations import (
-    expert_expectations,
+    mean_expectations,
     feature_expectations,
     norm,
     visited,
 )
 from replication.learning import reference
 from replication.paper.params import Params
-from replication.trials.condition import Condition, make_agent
+from replication.trials.agents import make_agent
+from replication.trials.condition import Condition
 
 Array = NDArray[np.float64]
 Words = NDArray[np.uint64]
@@ -228,7 +229,7 @@ def recorded(demos: Demos, *, seed: int = 1, **choices: Any) -> tuple[Trial, Rec
     """Run a trial in a maze; return its record and the expert's expectations, too."""
     params = Params.of(**{"episodes": 20, "horizon": 30, "max_iterations": 6, **choices})
     agent = Recorder(make_agent(demos.environment, params))
-    mu_e = expert_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
+    mu_e = mean_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
     mu_b = visited(demos.incorrect, shape=agent.shape)
     method = get_method("unified-incorrect")
     trial = run_trial(

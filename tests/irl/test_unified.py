@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from replication import Demos
 from replication.demos.model import Demo
 from replication.irl import READINGS, get_method, run_trial, unified
-from replication.irl.expectations import expert_expectations, visited
+from replication.irl.expectations import mean_expectations, visited
 from replication.paper.params import Params, Update
-from replication.trials.condition import make_agent
+from replication.trials.agents import make_agent
 from replication.trials.results import digest
 
 Array = NDArray[Any]
@@ -148,7 +148,7 @@ def digest_of(
     """Return the digest of a whole trial with these incorrect demonstrations."""
     params = Params.of(episodes=60, horizon=40, max_iterations=30, f_index=reading)
     agent = make_agent(demos.environment, params)
-    mu_e = expert_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
+    mu_e = mean_expectations(demos.correct, gamma=params.learner.gamma, shape=agent.shape)
     mu_b = visited(shown, shape=agent.shape)
     root = np.random.SeedSequence(seed)
     return digest(run_trial(agent, get_method(method), mu_e, mu_b, params, seed=root))

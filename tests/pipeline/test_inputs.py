@@ -244,4 +244,4 @@ def test_tables_of_needed_notebooks_count(write: Write, project: Path) -> None:
 def test_the_code_of_agents_counts(write: Write) -> None:
     """Modules that are only named, and imported when they are needed, are inputs, too."""
     found = inputs_of(write("from replication.trials.run import run_trials"), {})["source"]
-    assert {"replication.trials.maze_agent", "replication.trials.soccer_agent"} <= found.keys()
+    assert {"replication.trials.table_agent", "replication.trials.soccer_agent"} <= found.keys()

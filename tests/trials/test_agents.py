@@ -20,9 +20,10 @@ from replication.learning.seeds import stream
 from replication.paper.params import Learner
 from replication.paper.published import SOCCER
 from replication.paper.register import ChoiceError
-from replication.trials import maze_agent, soccer_agent
-from replication.trials.condition import Condition, make_agent
-from replication.trials.maze_agent import MazeAgent
+from replication.trials import soccer_agent, table_agent
+from replication.trials.agents import make_agent
+from replication.trials.condition import Condition
+from replication.trials.table_agent import TableAgent
 from replication.trials.soccer_agent import SoccerAgent
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 
 def test_each_environment_has_its_agent(small_demos: Demos, soccer_demos: Demos) -> None:
     """A maze makes a maze agent, a field a soccer agent, another kind an error that lists both."""
-    assert isinstance(make_agent(small_demos.environment, Params()), MazeAgent)
+    assert isinstance(make_agent(small_demos.environment, Params()), TableAgent)
     assert isinstance(make_agent(soccer_demos.environment, Params.of(**SOCCER)), SoccerAgent)
     chess: Any = SimpleNamespace(kind="chess")
     with pytest.raises(ChoiceError, match="unknown kind of environment 'chess'; known: maze, socc"):
@@ -42,7 +43,7 @@ def test_agents_refuse_the_other_kind_of_environment(
 ) -> None:
     """The maze's agent needs a maze and the soccer agent a field: else one line says so."""
     with pytest.raises(MazeError, match=r"a maze is needed here, .* of kind 'soccer'"):
-        maze_agent.make_agent(soccer_demos.environment, Params())
+        table_agent.make_agent(soccer_demos.environment, Params())
     with pytest.raises(UserError, match=r"robot soccer is needed here, .* of kind 'maze'"):
         soccer_agent.make_agent(small_demos.environment, Params())
 

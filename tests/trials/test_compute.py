@@ -126,7 +126,7 @@ BOTH = [
     *("irl.agent", "irl.expectations", "irl.loop", "paper.params", "paper.register"),
     *("learning", "learning.seeds", "learning.arguments", "learning.compiled"),
 ]
-MAZE = ["envs.maze", "learning.qlearning", "learning.reference", "trials.maze_agent"]
+MAZE = ["envs.maze", "learning.qlearning", "learning.reference", "trials.table_agent"]
 SOCCER = [
     *("envs.soccer", "envs.soccer.rules", "envs.soccer.world", "envs.soccer.compiled"),
     *("envs.soccer.field", "learning.soccer", "trials.soccer_agent"),

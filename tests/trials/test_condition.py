@@ -23,10 +23,3 @@ def test_unknown_method_and_absent_kind_are_refused(small_demos: Demos) -> None:
         Condition(small_demos, "unify", Params())
     with pytest.raises(DemoError, match="detour"):
         Condition(small_demos.select("hit"), "unified-incorrect", Params.of(incorrect="detour"))
-
-
-def test_choices_name_what_differs_from_the_defaults(small_demos: Demos) -> None:
-    """The column `choices` is empty for the defaults and lists ids and values otherwise."""
-    assert Condition(small_demos, "unified", Params()).choices == ""
-    params = Params.of(alpha=0.1, f_index="updated")
-    assert Condition(small_demos, "unified", params).choices == "F-INDEX=updated ALPHA=0.1"
