@@ -678,8 +678,8 @@ def choices(id: str | None) -> None:
         for group, members in choice_groups().items():
             click.echo(f"{group[0].upper()}{group[1:]}")
             for entry in members:
-                others = f"{'or ' * bool(entry.alternatives)}{_accepted(entry)}"
-                value = f"{entry.default} ({others})" if others else str(entry.default)
+                others = f"{'or ' * bool(entry.alternatives)}{entry.others}"
+                value = f"{entry.default} ({others})" if entry.others else str(entry.default)
                 _print_item(f"  {entry.id}", value, column)
         click.echo("\nreplicate choices ID shows one of them in full")
         return
@@ -688,15 +688,9 @@ def choices(id: str | None) -> None:
     entry = entries[id.upper()]
     fields = ("id", "place", "open", "default", "rule", "alternatives", "field", "data", "code")
     for key in fields:
-        value = _accepted(entry) if key == "alternatives" else str(getattr(entry, key))
+        value = entry.others if key == "alternatives" else str(getattr(entry, key))
         if value:
             _print_item(f"{key}:", value, 14)
-
-
-def _accepted(entry: Any) -> str:
-    if entry.range is not None:
-        return f"{entry.range[0]:g} to {entry.range[1]:g}"
-    return ", ".join(map(str, entry.alternatives))
 
 
 def _print_item(head: str, text: str, column: int) -> None:
