@@ -23,8 +23,8 @@ from replication.paper.register import ChoiceError
 from replication.trials import soccer_agent, table_agent
 from replication.trials.agents import make_agent
 from replication.trials.condition import Condition
-from replication.trials.table_agent import TableAgent
 from replication.trials.soccer_agent import SoccerAgent
+from replication.trials.table_agent import TableAgent
 
 Array = NDArray[np.float64]
 
