@@ -16,28 +16,42 @@ if TYPE_CHECKING:
     from replication.demos.files import check_demos, load_demos, save_demos
     from replication.demos.maze_expert import demonstrate
     from replication.demos.model import Demo, Demos
+    from replication.demos.tasks import make_demos
     from replication.envs.gym import MazeEnv
+    from replication.envs.gym_task import Bins, GymTask, WrappedTask
     from replication.envs.maze import Maze, MazeError
-    from replication.fitting import Fit, fit
+    from replication.envs.tabular import TabularTask
+    from replication.envs.task import TaskError
+    from replication.fitting import fit, fit_many
     from replication.irl import METHODS
+    from replication.learned_reward import LearnedReward
     from replication.paper.params import Params
+    from replication.result import Fit
 
 __version__ = "0.1.0"
 
 __all__ = [
     "METHODS",
+    "Bins",
     "Demo",
     "DemoError",
     "Demos",
     "Fit",
+    "GymTask",
+    "LearnedReward",
     "Maze",
     "MazeEnv",
     "MazeError",
     "Params",
+    "TabularTask",
+    "TaskError",
+    "WrappedTask",
     "check_demos",
     "demonstrate",
     "fit",
+    "fit_many",
     "load_demos",
+    "make_demos",
     "save_demos",
 ]
 
@@ -47,11 +61,17 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.files": ("check_demos", "load_demos", "save_demos"),
         "demos.maze_expert": ("demonstrate",),
         "demos.model": ("Demo", "Demos"),
+        "demos.tasks": ("make_demos",),
         "envs.gym": ("MazeEnv",),
+        "envs.gym_task": ("Bins", "GymTask", "WrappedTask"),
         "envs.maze": ("Maze", "MazeError"),
-        "fitting": ("Fit", "fit"),
+        "envs.tabular": ("TabularTask",),
+        "envs.task": ("TaskError",),
+        "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),
+        "learned_reward": ("LearnedReward",),
         "paper.params": ("Params",),
+        "result": ("Fit",),
     }
 
     def __getattr__(name):

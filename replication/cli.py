@@ -541,11 +541,9 @@ def learn(
     is reported as such, with exit code 0 unless --strict is given.
     """
     from replication.demos.files import load_demos
-    from replication.fitting import fit
+    from replication.fitting import fit, own_params
     from replication.irl import get_method
-    from replication.paper.params import Params
     from replication.progress import iteration_meter
-    from replication.report.learned import fit_figure
     from replication.report.style import save_figure
 
     _catch_signals()
@@ -554,9 +552,9 @@ def learn(
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
     if "incorrect" in parameters:
         raise UserError("-p incorrect is not taken here; choose the demos with --incorrect SET")
-    params = Params.of(incorrect="all", **parameters)
     with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")
+    params = own_params(demos, **parameters)
     stem = out / f"{demos.task}-{method}"
     saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
     _check_targets(saved, picture, source=file)
@@ -564,8 +562,7 @@ def learn(
     with iteration_meter() as report:
         result = fit(demos, method=method, params=params, seed=seed, report=report)
     result.save(saved)
-    figure = fit_figure(demos, result.actions, result.weights, result.errors)
-    save_figure(figure, stem, formats=("png",))
+    save_figure(result.plot(), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     _say(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
