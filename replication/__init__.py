@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from replication.demos.model import Demo, Demos
     from replication.demos.tasks import make_demos
     from replication.envs.gym import MazeEnv
-    from replication.envs.gym_task import Bins, GymTask, WrappedTask
+    from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
     from replication.envs.tabular import TabularTask
     from replication.envs.task import TaskError
+    from replication.envs.wrapped_task import Bins, WrappedTask
     from replication.fitting import fit, fit_many
     from replication.irl import METHODS
     from replication.learned_reward import LearnedReward
@@ -63,10 +64,11 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.model": ("Demo", "Demos"),
         "demos.tasks": ("make_demos",),
         "envs.gym": ("MazeEnv",),
-        "envs.gym_task": ("Bins", "GymTask", "WrappedTask"),
+        "envs.gym_task": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),
         "envs.tabular": ("TabularTask",),
         "envs.task": ("TaskError",),
+        "envs.wrapped_task": ("Bins", "WrappedTask"),
         "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),
         "learned_reward": ("LearnedReward",),

@@ -17,8 +17,8 @@ from replication.demos.files import demos_document, doubts, parse_demos
 from replication.demos.model import Demos
 from replication.demos.tasks import action_numbers
 from replication.envs.environment import Environment
-from replication.envs.gym_task import WrappedTask
 from replication.envs.task import Task
+from replication.envs.wrapped_task import WrappedTask
 from replication.errors import UserError, show
 from replication.files import FileError, read_json, write_file
 from replication.paper.params import Params
@@ -120,9 +120,10 @@ class Fit:
             f"result      {why[self.stopped]}; {self._number}, d = {self.error:.4g}",
         ]
         if not self.converged and loop.plateau:
-            lines.append(f"            reward and policy are those of iteration {self._nearest}")
+            nearest = int(self.errors.argmin())
+            lines.append(f"            reward and policy are those of iteration {nearest}")
         lines += [f"note        {doubt}" for doubt in (*doubts(demos), *open_ends(self))]
-        path = [f"{'' if len(cell) > 1 else cell[0]}" or str(cell) for cell, _ in self.path]
+        path = [",".join(map(str, cell)) for cell, _ in self.path]
         shown = path if len(path) <= 12 else [*path[:8], "...", *path[-3:]]
         return "\n".join([*lines, f"path        {' '.join(shown)} ({len(self.actions)} steps)"])
 
@@ -134,7 +135,7 @@ class Fit:
         """Return the name of the action that the policy takes.
 
         `state` is the number of a state, its numbers in files (such as row and column), or an
-        observation of a :class:`replication.WrappedTask`. Raises `FitError` if there is none such.
+        observation that the task can number. Raises `FitError` if there is none such.
         """
         return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
 
@@ -154,10 +155,6 @@ class Fit:
         from replication.report.learned import fit_figure
 
         return fit_figure(self.demos, self.states, self.actions, self.weights, self.errors)
-
-    @property
-    def _nearest(self) -> int:
-        return int(self.errors.argmin())
 
     @property
     def _number(self) -> str:

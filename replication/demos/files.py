@@ -20,6 +20,7 @@ from replication.demos.schema import (
 )
 from replication.demos.strict_json import layout, read_content
 from replication.envs.environment import Environment
+from replication.envs.task import Task
 from replication.errors import compact, show
 from replication.files import printable, reason, write_file
 
@@ -139,7 +140,8 @@ def doubts(demos: Demos) -> list[str]:
             f" (one of {len(conflicts)} such states): d = 0 cannot be reached"
         )
     paths = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
-    if len(paths) > 1 and not is_random(demos.environment):
+    is_random = isinstance(demos.environment, Task) and demos.environment.is_random
+    if len(paths) > 1 and not is_random:
         messages.append(
             f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
             "which a single deterministic trajectory cannot match"

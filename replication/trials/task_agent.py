@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.envs.environment import Environment
-from replication.envs.gym_task import GymTask, WrappedTask
+from replication.envs.gym_task import GymTask
 from replication.envs.moves import Moves
 from replication.envs.tabular import TabularTask
 from replication.envs.task import TaskError
+from replication.envs.wrapped_task import WrappedTask
 from replication.irl.agent import Agent, Episode
 from replication.learning import chance, planning, stepped
 from replication.paper.params import Params
@@ -66,12 +69,14 @@ class SteppedAgent:
     def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
         """Learn by Q-learning, see :func:`replication.learning.stepped.learn`."""
         env, state = self.task.env, self.task.state
-        return stepped.learn(env, state, weights, q, stream, **_learning(self.params))
+        with _numbered(self.task):
+            return stepped.learn(env, state, weights, q, stream, **_learning(self.params))
 
     def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Follow the greedy policy, see :func:`replication.learning.stepped.roll_out`."""
         env, state = self.task.env, self.task.state
-        return _episode(*stepped.roll_out(env, state, q, stream, **_rolling(self.params)))
+        with _numbered(self.task):
+            return _episode(*stepped.roll_out(env, state, q, stream, **_rolling(self.params)))
 
 
 def make_agent(environment: Environment, params: Params) -> Agent:
@@ -98,6 +103,19 @@ def make_agent(environment: Environment, params: Params) -> Agent:
     if isinstance(task, WrappedTask):
         return SteppedAgent(task, params)
     raise TaskError(f"an environment of kind {environment.kind!r} has no agent")
+
+
+@contextmanager
+def _numbered(task: WrappedTask) -> Iterator[None]:
+    """Turn what goes wrong when a state is no number of a state into one line."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        if isinstance(error, TaskError):
+            raise
+        raise TaskError(
+            f"{task.name}: each state must be a whole number from 0 to {task.n_states - 1}: {error}"
+        ) from error
 
 
 def _learning(params: Params) -> dict[str, Any]:
