@@ -111,12 +111,13 @@ class Fit:
             "plateau": f"not converged: no smaller d in {loop.plateau} iterations",
             "cap": f"not converged: ended at the cap of {loop.max_iterations} iterations",
         }
+        chosen = [f"{id}={value}" for id, value in self.params.differences().items()]
         kinds = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
         lines = [
             f"task        {demos.task}: {demos.environment.n_states} states, "
             f"{demos.environment.n_actions} actions",
             f"demos       {', '.join([f'{len(demos.correct)} correct', *kinds])}",
-            f"method      {self.method}, seed {self.seed}",
+            " ".join(["method      " + self.method, f"seed {self.seed}", *chosen]),
             f"result      {why[self.stopped]}; {self._number}, d = {self.error:.4g}",
         ]
         if not self.converged and loop.plateau:
@@ -128,13 +129,13 @@ class Fit:
         return "\n".join([*lines, f"path        {' '.join(shown)} ({len(self.actions)} steps)"])
 
     def policy(self) -> NDArray[np.int64]:
-        """Return the greedy action of each state, int64 [state]; of equals the first."""
+        """Return the greedy action of each state, int64 [state]."""
         return self.q.argmax(axis=1)
 
     def predict(self, state: Any) -> str:
         """Return the name of the action that the policy takes.
 
-        `state` is the number of a state, its numbers in files (such as row and column), or an
+        `state` is a state's number, its numbers in files (such as row and column), or an
         observation that the task can number. Raises `FitError` if there is none such.
         """
         return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
@@ -145,7 +146,7 @@ class Fit:
         return float(self.weights[self._state(state), number])
 
     def plot(self) -> Figure:
-        """Return a figure of the learned trajectory, the reward and the errors."""
+        """Return a figure of what was learned."""
         from replication.report.learned import fit_figure
 
         return fit_figure(self.demos, self.states, self.actions, self.weights, self.errors)

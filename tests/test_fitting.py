@@ -77,15 +77,16 @@ def test_every_method_learns_gymnasium_tasks(method: str) -> None:
     """FrozenLake and CliffWalking, which nobody here wrote, are learned exactly."""
     cliff = GymTask(gymnasium.make("CliffWalking-v1"), actions=("up", "right", "down", "left"))
     for task, way in ((lake(), ACROSS), (cliff, ["up", *["right"] * 11, "down"])):
-        result = fit({"correct": [way], "other": [way[:1]]}, task=task, method=method, seed=1)
+        result = fit({"correct": [way], "other": [["left"]]}, task=task, method=method, seed=1)
         assert result.converged
         assert [action for _, action in result.path[:-1]] == way
 
 
 def test_two_ways_end_on_a_plateau_with_a_word() -> None:
     """Correct demonstrations that differ give the nearest reward, and the fit says why it ended."""
-    with pytest.warns(DemoWarning, match="2 different trajectories"):
+    with pytest.warns(DemoWarning) as told:
         result = fit({"correct": [ACROSS, ALONG]}, task=lake(), seed=1)
+    assert any("2 different trajectories" in str(one.message) for one in told)
     assert (result.stopped, result.converged) == ("plateau", False)
     assert result.iterations == result.errors.argmin() + PLATEAU
     assert result.error == result.errors.min()
@@ -130,7 +131,7 @@ def test_own_parameters_suit_the_task() -> None:
 
 def test_values_by_name_are_parameters(small_demos: Demos) -> None:
     """A value that the register does not list is taken within its range, and makes a difference."""
-    few = {"episodes": 300, "horizon": 50}
+    few: dict[str, Any] = {"episodes": 300, "horizon": 50}
     one, other = fit(small_demos, seed=3, **few), fit(small_demos, seed=3, alpha=0.2, **few)
     assert other.params == Params.of(incorrect="all", alpha=0.2, **few)
     assert not np.array_equal(one.weights, other.weights)
@@ -157,7 +158,7 @@ def test_mistakes_of_a_call_are_one_line(
 
 
 def test_a_demonstration_that_stops_too_early_is_told() -> None:
-    """If the episode goes on after a correct demonstration, a warning says how to end both alike."""
+    """If the episode goes on after a correct demonstration, a warning says how to end both."""
     endless = TabularTask([[1, 0], [0, 1]], actions=("go", "stay"))
     with pytest.warns(
         DemoWarning, match="stops after 2 steps, but the episode goes on.*horizon = 2"

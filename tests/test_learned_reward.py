@@ -41,9 +41,8 @@ def test_another_learner_learns_the_way_from_the_reward() -> None:
         while not over:
             action = int(rng.integers(4) if rng.random() < 0.2 else q[state].argmax())
             after, reward, ended, cut, _ = env.step(action)
-            q[state, action] += 0.5 * (
-                reward + 0.9 * (not ended) * q[after].max() - q[state, action]
-            )
+            target = reward + 0.9 * (not ended) * q[after].max()
+            q[state, action] += 0.5 * (target - q[state, action])
             state, over = after, ended or cut
     state, way, over = env.reset()[0], list[int](), False
     while not over and len(way) < 20:

@@ -55,7 +55,7 @@ def test_a_summary_says_what_came_out_and_why_it_ended(corridor: Fit) -> None:
     for part in (
         "mine: 3 states, 2 actions",
         "1 correct, 1 dawdle",
-        "unified-incorrect, seed 1",
+        "unified-incorrect seed 1 INCORRECT-KINDS=all",
         "converged: d is within the threshold",
         "path        0 1 2 (2 steps)",
     ):
@@ -124,17 +124,11 @@ def test_observations_are_numbered_by_the_task() -> None:
 def test_each_kind_of_task_has_a_picture(fitted: Fit, corridor: Fit, soccer_demos: Demos) -> None:
     """A maze shows path, reward and errors; a task without a map shows the reward on its path."""
     soccer = fit(soccer_demos, seed=1, episodes=2, max_iterations=1)
-    panels = [
-        len([a for a in one.plot().axes if a.get_title()]) for one in (fitted, corridor, soccer)
-    ]
+    figures = [one.plot() for one in (fitted, corridor, soccer)]
+    panels = [sum(bool(axes.get_title()) for axes in figure.axes) for figure in figures]
     assert panels == [3, 2, 2]
-    reward = corridor.plot().axes[0]
-    np.testing.assert_allclose(
-        reward.lines[0].get_ydata(), [corridor.reward(0, "on"), corridor.reward(1, "on")]
-    )
-    np.testing.assert_allclose(
-        reward.lines[1].get_ydata(), [corridor.reward(0, "back"), corridor.reward(1, "back")]
-    )
+    for line, action in zip(figures[1].axes[0].lines, ("on", "back"), strict=True):
+        assert list(line.get_ydata()) == [corridor.reward(0, action), corridor.reward(1, action)]  # type: ignore[arg-type]
 
 
 # --- files -----------------------------------------------------------------------------------

@@ -60,9 +60,10 @@ class TabularTask(Task):
         actions: Sequence[str] | None = None,
     ) -> None:
         if isinstance(moves, Mapping):
-            shape, outcomes, ended = _of_gymnasium(moves)
+            shape, outcomes, ended, loose = _of_gymnasium(moves)
         else:
-            shape, outcomes, ended = _of_array(np.asarray(moves))
+            shape, outcomes = _of_array(np.asarray(moves))
+            ended, loose = [], []
         self.n_states = shape[0]
         self.actions = named_actions(actions, shape[1])
         ends = np.zeros(self.n_states, bool)
@@ -75,6 +76,11 @@ class TabularTask(Task):
             self.table = Moves.of(outcomes, shape=shape, starts=starts, ends=ends)
         except ValueError as error:
             raise TaskError(str(error)) from None
+        for state in self._reachable().intersection(loose):
+            raise TaskError(
+                f"P: a move from state {state} does not end the episode where another one does; "
+                "step the environment instead: WrappedTask(env, int, n_states)"
+            )
 
     @property
     def is_random(self) -> bool:
@@ -116,6 +122,18 @@ class TabularTask(Task):
         """Return whether the last state ends an episode."""
         return bool(self.table.ends[states[-1]])
 
+    def _reachable(self) -> set[int]:
+        """Return the states that are visited in some episode, but for those that end one."""
+        found: set[int] = set()
+        waiting = {*self.table.starts.tolist()}
+        while waiting:
+            state = waiting.pop()
+            found.add(state)
+            first, last = self.table.first[[state * self.n_actions, (state + 1) * self.n_actions]]
+            after = self.table.successors[first:last]
+            waiting |= {*after[~self.table.ends[after]].tolist()} - found
+        return found
+
     def describe(self) -> dict[str, Any]:
         """Return plain JSON values; a digest stands for the table."""
         digest = hashlib.sha256()
@@ -133,15 +151,15 @@ Outcomes = tuple[list[Any] | Ints, list[Any] | Ints, list[Any] | Ints, list[Any]
 """States, actions, the states that they lead to, and probabilities."""
 
 
-def _of_array(table: NDArray[Any]) -> tuple[tuple[int, int], Outcomes, list[int]]:
-    """Return the shape [state, action] and the outcomes of an array; it names no ends."""
+def _of_array(table: NDArray[Any]) -> tuple[tuple[int, int], Outcomes]:
+    """Return the shape [state, action] and the outcomes of an array."""
     if table.ndim == 2 and table.dtype.kind in "iu" and table.size:
         states, actions = np.indices(table.shape).reshape(2, -1)
         successors = _states(table.ravel(), len(table), "moves")
-        return table.shape, (states, actions, successors, np.ones(table.size)), []
+        return table.shape, (states, actions, successors, np.ones(table.size))
     if table.ndim == 3 and table.dtype.kind in "iuf" and len(table) == table.shape[2] > 0:
         states, actions, successors = np.nonzero(table)
-        return table.shape[:2], (states, actions, successors, table[table != 0]), []
+        return table.shape[:2], (states, actions, successors, table[table != 0])
     raise TaskError(
         "moves must be integers [state, action], or probabilities [state, action, next state], "
         f"not {table.dtype} {list(table.shape)}"
@@ -150,8 +168,11 @@ def _of_array(table: NDArray[Any]) -> tuple[tuple[int, int], Outcomes, list[int]
 
 def _of_gymnasium(
     table: Mapping[int, Mapping[int, Sequence[tuple[Any, ...]]]],
-) -> tuple[tuple[int, int], Outcomes, list[int]]:
-    """Return the shape [state, action] of Gymnasium's table, its outcomes, and its ends."""
+) -> tuple[tuple[int, int], Outcomes, list[int], list[int]]:
+    """Return the shape [state, action] of Gymnasium's table, its outcomes and its ends.
+
+    The last are states from which a move to one of the ends does not end the episode.
+    """
     found = [
         (state, action, *outcome)
         for state, row in table.items()
@@ -159,9 +180,12 @@ def _of_gymnasium(
         for outcome in outcomes
     ]
     states, actions, probabilities, successors, _, done = zip(*found, strict=True)
-    ends = [state for state, over in zip(successors, done, strict=True) if over]
+    ends = {state for state, over in zip(successors, done, strict=True) if over}
+    moves = zip(states, successors, done, strict=True)
+    loose = [state for state, successor, over in moves if successor in ends and not over]
     shape = len(table), max(actions) + 1
-    return shape, (list(states), list(actions), list(successors), list(probabilities)), ends
+    outcomes = list(states), list(actions), list(successors), list(probabilities)
+    return shape, outcomes, [*ends], loose
 
 
 def _starts(start: Any, n_states: int) -> Floats:

@@ -23,7 +23,7 @@ def lake(**options: Any) -> GymTask:
 
 def test_names_numbers_and_pairs_are_the_same_demonstration() -> None:
     """Actions by name, by number, or with their states give the same states and actions."""
-    ways = (["on", "on"], [1, 1], ([0, 1, 2], ["on", 1]))
+    ways: list[Any] = [["on", "on"], [1, 1], ([0, 1, 2], ["on", 1])]
     made = [make_demos(CORRIDOR, {"correct": [way]}).correct[0] for way in ways]
     assert made[0] == made[1] == made[2]
     assert made[0].states.tolist() == [0, 1, 2]

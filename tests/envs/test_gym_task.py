@@ -47,6 +47,16 @@ def test_a_table_says_what_stepping_says() -> None:
         assert task.fault(np.array(states), np.array(actions)) is None
 
 
+def test_a_move_that_ends_nothing_where_another_does_is_refused() -> None:
+    """An end that depends on the move is no state's, so such a table is not taken."""
+    moves = {
+        0: {0: [(1.0, 1, 0.0, True)], 1: [(1.0, 1, 0.0, False)]},
+        1: {0: [(1.0, 1, 0.0, True)], 1: [(1.0, 1, 0.0, True)]},
+    }
+    with pytest.raises(TaskError, match="a move from state 0 does not end the episode"):
+        TabularTask(moves)
+
+
 def test_a_wrapper_that_may_change_the_moves_hides_the_table() -> None:
     """Actions that a wrapper swaps are stepped, and lead where the wrapper leads them."""
     env = lake(is_slippery=False)
@@ -79,8 +89,8 @@ def test_environments_without_a_table_are_stepped() -> None:
 class Counted(gymnasium.Env[int, int]):
     """Five states in a row, whose states and actions are counted from 1."""
 
-    observation_space = spaces.Discrete(5, start=1)
-    action_space = spaces.Discrete(2, start=1)
+    observation_space: Any = spaces.Discrete(5, start=1)
+    action_space: Any = spaces.Discrete(2, start=1)
 
     def reset(self, *, seed: Any = None, options: Any = None) -> tuple[int, dict[str, Any]]:
         """Go to the first state."""

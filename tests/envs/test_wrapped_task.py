@@ -104,5 +104,6 @@ def test_bins_number_every_vector(
 )
 def test_bins_that_cut_nothing_are_refused(wrong: dict[str, Any]) -> None:
     """Bins need finite ranges, as many as there are counts, and one bin at least."""
+    usual: dict[str, Any] = {"low": [0.0, 0.0], "high": [1.0, 1.0], "counts": [5, 5]}
     with pytest.raises(TaskError, match="Bins: low, high and counts"):
-        Bins(**{"low": [0.0, 0.0], "high": [1.0, 1.0], "counts": [5, 5]} | wrong)
+        Bins(**usual | wrong)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
+from replication.envs.moves import Moves
 from replication.learning import chance, chance_reference, planning, qlearning, reference
-from replication.learning.moves import Moves
 from replication.learning.seeds import stream
 from replication.source import source_hash
 from tests.learning.test_qlearning import NUMBERS, problems

@@ -53,7 +53,7 @@ def test_values_are_distinct_and_of_one_type(entry: Choice) -> None:
     assert (entry.range is not None) == (bool(entry.field) and number)
     assert bool(entry.alternatives) or entry.range or not entry.field
     if entry.range is not None:
-        assert all(entry.range[0] <= value <= entry.range[1] for value in values)
+        assert all(entry.range[0] <= float(value) <= entry.range[1] for value in values)
 
 
 def test_what_is_registered_is_told_from_what_is_accepted() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import gymnasium
@@ -8,6 +9,7 @@ import pytest
 
 from replication import Bins, GymTask, Maze, Params, TabularTask, TaskError, WrappedTask
 from replication.envs.gym import MazeEnv
+from replication.learning import reference
 from replication.learning.seeds import stream
 from replication.paper.register import ChoiceError
 from replication.trials.agents import make_agent
@@ -56,8 +58,6 @@ def test_a_maze_that_is_stepped_is_learned_as_a_maze() -> None:
     stepped = make_agent(GymTask(MazeEnv(MAZE)), params)
     table = make_agent(MAZE, params)
     later = words()
-    from replication.learning import reference
-
     advanced = later.tolist()
     reference.draw(advanced)
     q = np.zeros(table.shape)
@@ -90,20 +90,15 @@ def test_planning_knows_the_odds() -> None:
     assert (after.tolist(), steps, hits) == (words().tolist(), 0, 0)
 
 
-def test_a_function_that_errs_while_learning_is_one_line() -> None:
+@pytest.mark.parametrize("wrong", ["x", 99, 0.5])
+def test_a_function_that_errs_while_learning_is_one_line(wrong: Any) -> None:
     """States that are no numbers, met only while learning, are told with the task's name."""
-    calls: list[int] = []
-
-    def late(observation: Any) -> Any:
-        calls.append(1)
-        return 0 if len(calls) < 2000 else "x" if wrong == "text" else 99
-
-    for wrong in ("text", "number"):
-        calls.clear()
-        task = WrappedTask(gymnasium.make("MountainCar-v0"), late, 4)
-        agent = make_agent(task, Params.of(episodes=100, horizon=100))
-        with pytest.raises(TaskError, match=r"^MountainCar-v0: each state must be a whole number"):
-            agent.learn(np.zeros(agent.shape), np.zeros(agent.shape), words())
+    calls = itertools.count()
+    env = gymnasium.make("MountainCar-v0")
+    task = WrappedTask(env, lambda _: 0 if next(calls) < 2000 else wrong, 4)
+    agent = make_agent(task, Params.of(episodes=100, horizon=100))
+    with pytest.raises(TaskError, match=r"^MountainCar-v0: each state must be a whole number"):
+        agent.learn(np.zeros(agent.shape), np.zeros(agent.shape), words())
 
 
 @pytest.mark.parametrize(

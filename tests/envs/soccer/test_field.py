@@ -52,7 +52,7 @@ def test_demos_survive_their_file() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"drive_time": 0.41}, "environment: SoccerParams.drive_time = 0.41 is not accepted"),
+        ({"drive_time": 0.0}, "environment: SoccerParams.drive_time = 0.0 is not accepted"),
         ({"rays": 0}, "environment: SoccerParams.rays = 0 is not accepted"),
         ({"speed": 0.05}, "environment: speed = 0.05 must be at least slow_speed"),
         ({"kind": "socer"}, "environment.kind: unknown kind 'socer' (did you mean 'soccer'?)"),
