@@ -2,7 +2,7 @@
 
 The public interface::
 
-    demos = load_demos("data/demos/open_maze.json")
+    demos = load_demos(stored("open_maze"))  # or the path of your own file
     result = fit(demos, method="unified-incorrect", seed=1)
     result.save("result.json")
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from replication.demos.model import Demo, Demos
     from replication.envs.gym import MazeEnv
     from replication.envs.maze import Maze, MazeError
+    from replication.files import stored
     from replication.fitting import Fit, fit
     from replication.irl import METHODS
     from replication.paper.params import Params
@@ -39,6 +40,7 @@ __all__ = [
     "fit",
     "load_demos",
     "save_demos",
+    "stored",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to know every name
@@ -49,6 +51,7 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.model": ("Demo", "Demos"),
         "envs.gym": ("MazeEnv",),
         "envs.maze": ("Maze", "MazeError"),
+        "files": ("stored",),
         "fitting": ("Fit", "fit"),
         "irl": ("METHODS",),
         "paper.params": ("Params",),
