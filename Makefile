@@ -53,10 +53,12 @@ readme: $(VENV)/.ready ## bring the claims in README.md up to date with figures/
 	$(RUN) tools/readme.py
 
 # One version of a package for all Pythons (--fork-strategy fewest): the same numbers everywhere.
-lock: $(VENV)/.ready ## pin the newest versions in environment.lock and check them on every Python
+# What is pinned stays, since results depend on it; `make lock UPGRADE=--upgrade` pins the newest.
+lock: $(VENV)/.ready ## pin in environment.lock what it lacks, and check it on every Python
 	$(RUN) -m uv pip compile --no-config --quiet --universal --fork-strategy fewest --python-version 3.11 \
-	    --generate-hashes --only-binary :all: --upgrade --no-annotate \
-	    --custom-compile-command 'make lock' --extra site --extra dev --output-file environment.lock pyproject.toml
+	    --generate-hashes --only-binary :all: $(UPGRADE) --no-annotate \
+	    --extra notebooks --extra cluster --extra minari --extra site --extra dev \
+	    --custom-compile-command 'make lock' --output-file environment.lock pyproject.toml
 	$(RUN) tools/check_lock.py
 	@set -e; for version in 3.11 3.12 3.13; do \
 	    echo "resolving environment.lock for Python $$version"; \

@@ -2,7 +2,7 @@
 
 The public interface::
 
-    demos = load_demos("data/demos/open_maze.json")
+    demos = load_demos(stored("open_maze"))  # or the path of your own file
     result = fit(demos, method="unified-incorrect", seed=1)
     result.save("result.json")
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from replication.envs.tabular import TabularTask
     from replication.envs.task import TaskError
     from replication.envs.wrapped_task import Bins, WrappedTask
+    from replication.files import stored
     from replication.fitting import fit, fit_many
     from replication.irl import METHODS
     from replication.learned_reward import LearnedReward
@@ -54,6 +55,7 @@ __all__ = [
     "load_demos",
     "make_demos",
     "save_demos",
+    "stored",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to know every name
@@ -69,6 +71,7 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "envs.tabular": ("TabularTask",),
         "envs.task": ("TaskError",),
         "envs.wrapped_task": ("Bins", "WrappedTask"),
+        "files": ("stored",),
         "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),
         "learned_reward": ("LearnedReward",),

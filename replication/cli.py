@@ -31,7 +31,7 @@ from typing import Any, NoReturn
 import click
 
 from replication import files
-from replication.errors import UserError, show, unknown
+from replication.errors import UserError, need, show, unknown
 
 GRACE = 5.0
 """Grace period after Ctrl-C, in seconds: further signals are ignored during clean-up."""
@@ -86,6 +86,16 @@ class OneLineErrors(click.Group):
             if _is_interruption(error):
                 _end("interrupted", 130)
             raise
+
+
+class InClone(click.Command):
+    """Works on the notebooks and what they publish, which only a clone of the repository has."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command if this is a clone where the notebooks could run."""
+        files.check_clone()
+        need("notebooks")
+        return super().invoke(ctx)
 
 
 def _is_interruption(error: BaseException | None) -> bool:
@@ -228,7 +238,7 @@ def demos_group() -> None:
 # --- notebooks -------------------------------------------------------------------------------
 
 
-@app.command(epilog="Example: replicate run open_maze --profile quick -p set_trials 4")
+@app.command(cls=InClone, epilog="Example: replicate run open_maze --profile quick -p set_trials 4")
 @notebooks_argument
 @profile_option
 @jobs_option
@@ -272,6 +282,8 @@ def run(
     from replication.pipeline.notebook import RunError
     from replication.pipeline.run import destination, run_notebooks
 
+    if options["scheduler"]:
+        need("cluster")
     _catch_signals()
     named = [_notebook(name) for name in notebooks] or _all_notebooks()
     paths = list(dict.fromkeys(named))
@@ -335,7 +347,7 @@ CHECKS: dict[str, Callable[[], object]] = {
 """What is checked before a notebook runs that reads one of these files."""
 
 
-@app.command(epilog="Example: replicate draw fig05")
+@app.command(cls=InClone, epilog="Example: replicate draw fig05")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @outputs_options
 def draw(names: tuple[str, ...], profile: str, out: Path | None) -> None:
@@ -367,7 +379,7 @@ def _drawn(code: str, table: Path) -> dict[str, bytes]:
         return {path.suffix: path.read_bytes() for path in paths}
 
 
-@app.command(epilog="Example: replicate status")
+@app.command(cls=InClone, epilog="Example: replicate status")
 @outputs_options
 @click.option("--all", is_flag=True, help="Show every notebook, figure and table.")
 def status(profile: str, out: Path | None, all: bool) -> None:
@@ -383,7 +395,7 @@ def status(profile: str, out: Path | None, all: bool) -> None:
         _say(line)
 
 
-@app.command(epilog="Example: replicate verify open_maze")
+@app.command(cls=InClone, epilog="Example: replicate verify open_maze")
 @notebooks_argument
 @outputs_options
 @jobs_option
@@ -459,7 +471,7 @@ def _disagreements(
     )
 
 
-@app.command(epilog="Example: replicate copy open_maze --profile quick")
+@app.command(cls=InClone, epilog="Example: replicate copy open_maze --profile quick")
 @click.argument("notebook", shell_complete=_complete)
 @profile_option
 def copy(notebook: str, profile: str) -> None:
@@ -478,7 +490,7 @@ def copy(notebook: str, profile: str) -> None:
     _say(f"open it: {shlex.join(['jupyter', 'lab', _short(made)])}")
 
 
-@app.command(epilog="Example: replicate clean --dry-run")
+@app.command(cls=InClone, epilog="Example: replicate clean --dry-run")
 @outputs_options
 @click.option("--dry-run", is_flag=True, help="Only show what would be removed.")
 def clean(profile: str, out: Path | None, dry_run: bool) -> None:
@@ -489,13 +501,14 @@ def clean(profile: str, out: Path | None, dry_run: bool) -> None:
     status.clean(*_prepared(profile, out), dry_run=dry_run, echo=click.echo)
 
 
-@app.command(epilog="Example: replicate site")
+@app.command(cls=InClone, epilog="Example: replicate site")
 @folder("Where the site goes.", Path("build/site"))
 def site(out: Path) -> None:
     """Build the report from published results.
 
     Nothing is executed.
     """
+    need("site")
     from replication.site.build import build_site
 
     _catch_signals()
@@ -724,10 +737,7 @@ def _notebook(name: str) -> Path:
 
 
 def _all_notebooks() -> list[Path]:
-    paths = sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
-    if not paths:
-        raise UserError(f"there is no notebook in {files.PROJECT / 'notebooks'}")
-    return paths
+    return sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
 
 
 def _check_targets(*targets: Path, source: Path) -> None:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterable
+from importlib.util import find_spec
 from typing import Any
+
+EXTRAS = {
+    "notebooks": ("ipykernel", "joblib", "nbformat", "packaging", "papermill", "scipy"),
+    "cluster": ("distributed", "joblib"),
+    "site": ("bs4", "jinja2", "myst_nb", "sphinx", "yaml"),
+    "minari": ("h5py", "minari"),
+}
+"""The modules that each extra of the package brings, as far as this package imports them."""
 
 
 class UserError(ValueError):
@@ -14,6 +23,22 @@ class UserError(ValueError):
     def _render_traceback_(self) -> list[str]:
         """Show one line in a notebook instead of a traceback; IPython asks for it by this name."""
         return [f"error: {self}"]
+
+
+def need(extra: str) -> None:
+    """Check that the modules of an extra are installed, before they are imported.
+
+    Raises
+    ------
+    UserError
+        If one is missing, with the command that installs it.
+    """
+    for module in EXTRAS[extra]:
+        if find_spec(module) is None:
+            raise UserError(
+                f"{module} is not installed; the extra {extra!r} has it: "
+                f"pip install 'unified-irl-replication[{extra}]'"
+            )
 
 
 def unknown(name: str, known: Iterable[str], what: str) -> str:

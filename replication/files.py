@@ -16,7 +16,7 @@ from typing import IO, Any
 
 import psutil
 
-from replication.errors import UserError, show
+from replication.errors import UserError, show, unknown
 
 LARGEST = 100_000_000
 """Bytes that a file may have."""
@@ -223,6 +223,48 @@ PROJECT = Path(__file__).resolve().parents[1]
 
 :meta hide-value:
 """
+
+
+def check_clone() -> None:
+    """Check that the package lies in a clone of the repository, which has the notebooks.
+
+    Raises
+    ------
+    UserError
+        If it is not, with the commands that make one.
+    """
+    if not any((PROJECT / "notebooks").glob("*.ipynb")):
+        raise UserError(
+            "there are no notebooks beside the installed package; clone the repository and work "
+            "there: git clone <its address> replication && cd replication && make"
+        )
+
+
+STORED = ("open_maze", "obstacle_maze", "soccer")
+"""The names of the demonstrations that come with the package."""
+
+
+def stored(name: str) -> Path:
+    """Return the file of demonstrations that come with the package.
+
+    Parameters
+    ----------
+    name
+        `open_maze`, `obstacle_maze` or `soccer`.
+
+    Raises
+    ------
+    UserError
+        If there are none of that name.
+
+    Examples
+    --------
+    >>> stored("open_maze").name
+    'open_maze.json'
+    """
+    if name not in STORED:
+        raise UserError(unknown(name, STORED, "demonstrations"))
+    return Path(__file__).parent / "stored" / f"{name}.json"
 
 
 def resolve(path: str | os.PathLike[str]) -> Path:

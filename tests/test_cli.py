@@ -25,7 +25,7 @@ from replication import Fit, Maze, MazeError, cli, demonstrate, files, load_demo
 from replication.demos.maze_expert import Expert
 from replication.demos.model import Demos
 from replication.demos.schema import json_schema
-from replication.errors import UserError
+from replication.errors import EXTRAS, UserError
 from replication.evidence import claims, specifications
 from replication.irl import METHODS
 from replication.paper.register import load_choices
@@ -177,8 +177,37 @@ def test_run_refuses_in_one_line(project: Path) -> None:
     assert "profile 'paper'" in refused("run", "--profile", "quick", "--out", figures)
     assert "a run with -p trials" in refused("run", "-p", "trials", "3", "--out", figures)
     assert "a run with --seed" in refused("run", "--seed", "1", "--out", figures)
-    (project / "notebooks" / "toy.ipynb").unlink()
-    assert "there is no notebook in" in refused("run")
+
+
+@pytest.mark.parametrize(
+    "words", [["run"], ["draw"], ["status"], ["verify"], ["copy", "toy"], ["clean"], ["site"]]
+)
+def test_what_needs_a_clone_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    """Beside an installed package there are no notebooks: one line, and nothing is written."""
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert "clone the repository and work there: git clone" in refused(*words)
+    assert replicate(*words, "--help").exit_code == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [
+        (["status"], "notebooks"),
+        (["run", "--scheduler", "tcp://127.0.0.1:9"], "cluster"),
+        (["site"], "site"),
+    ],
+)
+def test_what_needs_an_extra_says_so(
+    project: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], extra: str
+) -> None:
+    """Where a package of an extra is not installed, the command to install it is named."""
+    monkeypatch.setitem(EXTRAS, extra, ("no_such_module",))
+    line = "no_such_module is not installed; the extra '{0}' has it: pip install '{1}[{0}]'"
+    assert refused(*words) == f"error: {line.format(extra, 'unified-irl-replication')}\n"
 
 
 def test_refusal_in_a_cell_is_one_line(kernel: Path) -> None:

@@ -28,6 +28,7 @@ from replication.files import (
     read_text,
     scratch_folder,
     shown_as,
+    stored,
     write_file,
 )
 from tests.conftest import Spoil
@@ -292,6 +293,18 @@ def test_paths_are_shown_from_the_project_on(
     monkeypatch.setattr(files, "PROJECT", tmp_path / "project")
     assert shown_as(tmp_path / "project" / "build" / "quick") == "build/quick"
     assert shown_as(tmp_path / "project" / ".." / "elsewhere") == "elsewhere"
+
+
+@pytest.mark.parametrize("name", files.STORED)
+def test_stored_demonstrations_are_those_of_the_project(name: str) -> None:
+    """They are the files of `data/demos`, which notebooks read, and not copies."""
+    assert stored(name).samefile(files.PROJECT / "data" / "demos" / f"{name}.json")
+
+
+def test_other_demonstrations_are_not_stored() -> None:
+    """A name that is not known is answered with those that are."""
+    with pytest.raises(UserError, match=r"'open_mase' \(did you mean 'open_maze'\?\); known: "):
+        stored("open_mase")
 
 
 def test_paths_prefer_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

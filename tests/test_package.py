@@ -14,6 +14,14 @@ def test_every_public_name_is_there() -> None:
     assert not hasattr(replication, "nothing")
 
 
+def test_what_one_uses_first_is_light() -> None:
+    """Learning imports nothing that draws, tabulates, runs notebooks or computes in parallel."""
+    heavy = {"matplotlib", "pandas", "IPython", "nbformat", "papermill", "joblib", "distributed"}
+    code = f"import sys, replication; replication.fit; print({heavy} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
 def test_the_package_alone_is_light() -> None:
     """Nothing is imported before it is used, and no module hides a name."""
     code = (

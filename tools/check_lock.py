@@ -12,6 +12,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PYTHONS = ("3.11", "3.12", "3.13")
+UNLOCKED = "croissant"  # the extra that cannot be locked, pyproject.toml says why
 PIN = re.compile(r"([\w-]+==[\w.!+]+(?: ; [^@]+?)?)((?: --hash=sha256:[0-9a-f]{64})+)")
 
 
@@ -37,8 +38,9 @@ def read_pins(lock: str) -> list[Requirement]:
 def read_requirements(project: str) -> list[Requirement]:
     """Return what the text of a pyproject.toml asks for: to build, to run and for each extra."""
     table = tomllib.loads(project)
-    extras = table["project"].get("optional-dependencies", {}).values()
-    groups = [table["build-system"]["requires"], table["project"]["dependencies"], *extras]
+    extras = table["project"].get("optional-dependencies", {})
+    locked = [texts for extra, texts in extras.items() if extra != UNLOCKED]
+    groups = [table["build-system"]["requires"], table["project"]["dependencies"], *locked]
     return [Requirement(text) for group in groups for text in group]
 
 
