@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from replication.demos.checks import DemoError
+    from replication.demos.csv import read_csv
     from replication.demos.files import check_demos, load_demos, save_demos
     from replication.demos.maze_expert import demonstrate
+    from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
+    from replication.demos.terminal import record
     from replication.envs.gym import MazeEnv
     from replication.envs.maze import Maze, MazeError
     from replication.fitting import Fit, fit
@@ -37,16 +40,23 @@ __all__ = [
     "check_demos",
     "demonstrate",
     "fit",
+    "from_minari",
     "load_demos",
+    "read_csv",
+    "record",
     "save_demos",
+    "to_minari",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to know every name
     _MODULES = {
         "demos.checks": ("DemoError",),
+        "demos.csv": ("read_csv",),
         "demos.files": ("check_demos", "load_demos", "save_demos"),
         "demos.maze_expert": ("demonstrate",),
+        "demos.minari": ("from_minari", "to_minari"),
         "demos.model": ("Demo", "Demos"),
+        "demos.terminal": ("record",),
         "envs.gym": ("MazeEnv",),
         "envs.maze": ("Maze", "MazeError"),
         "fitting": ("Fit", "fit"),

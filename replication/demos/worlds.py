@@ -1,0 +1,220 @@
+"""Where someone demonstrates by hand: it plays actions, and draws what came of them as text."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+
+from replication.demos.checks import goal_phrase, no_op_phrase
+from replication.demos.stand_in import GymTask
+from replication.envs.environment import Environment
+from replication.envs.gym import MazeEnv
+from replication.envs.maze import Maze
+from replication.errors import UserError, clip
+
+AGENT, WAY, GOAL, WALL, PLAIN = "\x1b[1;31m", "\x1b[36m", "\x1b[1;32m", "\x1b[2m", "\x1b[0m"
+"""How a terminal is told to colour a cell of a maze."""
+
+HEADS = {"up": "^", "down": "v", "right": ">", "left": "<"}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What came of some actions.
+
+    Attributes
+    ----------
+    states
+        Those visited, the start included.
+    told
+        What the last action did, in a few words; empty if that goes without saying.
+    over
+        Whether no action can follow.
+    """
+
+    states: tuple[int, ...]
+    told: str = ""
+    over: bool = False
+
+
+class World(Protocol):
+    """An environment in which someone demonstrates."""
+
+    @property
+    def environment(self) -> Environment:
+        """What the demonstrations are of."""
+        ...
+
+    def play(self, actions: Sequence[int], attempt: int) -> Scene:
+        """Play actions from the start; moves that are random repeat in the same attempt.
+
+        Raises
+        ------
+        UserError
+            If that cannot be done.
+        """
+        ...
+
+    def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
+        """Return lines of text that show the end of the scene, which was played last."""
+        ...
+
+
+def as_world(given: Any) -> World:
+    """Return the world of an environment of ours or of Gymnasium.
+
+    Raises
+    ------
+    UserError
+        If its states or actions are not numbered.
+    """
+    if isinstance(given, gymnasium.Env):
+        bare = given.unwrapped
+        return _Known(bare.maze) if isinstance(bare, MazeEnv) else _Stepped(given, GymTask(given))
+    if not hasattr(given, "replay"):
+        raise UserError(f"give a maze, a task or a Gymnasium environment, not {clip(repr(given))}")
+    if isinstance(inner := getattr(given, "env", None), gymnasium.Env):
+        return _Stepped(inner, given)
+    return _Random(given) if getattr(given, "is_random", False) else _Known(given)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A deterministic environment that can be replayed."""
+
+    environment: Environment
+
+    def play(self, actions: Sequence[int], attempt: int) -> Scene:
+        states = tuple(self.environment.replay(actions).tolist())
+        over = _ended(self.environment, actions)
+        stays = len(states) > 1 and states[-1] == states[-2]
+        return Scene(states, _told(self.environment, over=over, stays=stays), over)
+
+    def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
+        if isinstance(self.environment, Maze):
+            return _drawn(self.environment, actions, scene.states, columns, lines)
+        return []
+
+
+def _ended(environment: Any, actions: Sequence[int]) -> bool:
+    """Return whether the episode is over; a task's own end need not be its goal."""
+    if hasattr(environment, "walk"):
+        return environment.walk(actions).end is not None
+    return environment.goal_step(actions) is not None
+
+
+def _told(environment: Environment, *, over: bool, stays: bool) -> str:
+    if over:
+        reached = {"maze": goal_phrase(environment), "soccer": "the gate: a goal"}
+        return f"reaches {reached.get(environment.kind, 'an end of the episode')}"
+    return no_op_phrase(environment) if stays else ""
+
+
+@dataclass(frozen=True)
+class _Random:
+    """A task whose table of moves has several outcomes; an attempt is the seed of the luck."""
+
+    environment: Any
+
+    def play(self, actions: Sequence[int], attempt: int) -> Scene:
+        task, luck = self.environment, np.random.default_rng(attempt)
+        states = [int(luck.choice(task.starts, p=task.start_probabilities))]
+        for action in actions:
+            pair = states[-1], action
+            states.append(int(luck.choice(task.successors[pair], p=task.probabilities[pair])))
+        over, stays = bool(task.ends[states[-1]]), states[-1:] == states[-2:-1]
+        return Scene(tuple(states), _told(task, over=over, stays=stays), over)
+
+    def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
+        return []
+
+
+def _drawn(
+    maze: Maze, actions: Sequence[int], states: Sequence[int], columns: int, lines: int
+) -> list[str]:
+    """Draw the part of a maze around the agent that has room, and the way that it took."""
+    heads = {state: HEADS[maze.actions[a]] for state, a in zip(states, actions, strict=False)}
+    row, column = maze.cell(states[-1])
+
+    def cell(at: tuple[int, int]) -> str:
+        state, character = maze.state(*at), maze.rows[at[0]][at[1]]
+        if state == states[-1]:
+            return f"{AGENT}@{PLAIN}"
+        if state in heads and character == ".":
+            return f"{WAY}{heads[state]}{PLAIN}"
+        colour = {"S": WAY, "G": GOAL, "#": WALL}.get(character)
+        return f"{colour}{character}{PLAIN}" if colour else character
+
+    # a blank between two cells makes them about as wide as high
+    across = _around(column, maze.shape[1], max(columns // 2, 1))
+    down = _around(row, maze.shape[0], max(lines, 1))
+    return [" ".join(cell((at, beside)) for beside in across) for at in down]
+
+
+def _around(place: int, length: int, room: int) -> range:
+    """Return the part of a length that has room, with the place in its middle if possible.
+
+    Examples
+    --------
+    >>> _around(5, 9, 3), _around(0, 9, 3), _around(8, 9, 3), _around(1, 2, 3)
+    (range(4, 7), range(0, 3), range(6, 9), range(0, 2))
+    """
+    first = max(min(place - room // 2, length - room), 0)
+    return range(first, min(first + room, length))
+
+
+class _Stepped:
+    """A Gymnasium environment: it is stepped, and begins anew only where a step is undone."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any], environment: Environment) -> None:
+        self.environment = environment
+        self._env = _own(env)
+        self._number: Callable[[Any], int] = getattr(environment, "state_of", int)
+        self._attempt = -1
+        self._actions: list[int] = []
+        self._scenes: list[Scene] = []
+
+    def play(self, actions: Sequence[int], attempt: int) -> Scene:
+        before = self._scenes if attempt == self._attempt else []
+        if not before or self._actions != [*actions[: len(self._actions)]]:
+            state, _ = self._env.reset(seed=attempt)
+            self._attempt, self._actions, self._scenes = (
+                attempt,
+                [],
+                [Scene((self._number(state),))],
+            )
+        for action in actions[len(self._actions) :]:
+            self._actions.append(action)
+            self._scenes.append(self._stepped(action))
+        scene = self._scenes[-1]
+        if before and len(before) > len(actions) and before[len(actions)].states != scene.states:
+            raise UserError(
+                "this environment does not repeat itself after reset(seed=...), so that no step "
+                "can be undone or shown again; it began anew"
+            )
+        return scene
+
+    def _stepped(self, action: int) -> Scene:
+        state, reward, terminated, truncated, _ = self._env.step(action)
+        told = f"reward {float(reward):g}"
+        if terminated or truncated:
+            told += ", and the episode is over" + (": its time is up" if truncated else "")
+        states = *self._scenes[-1].states, self._number(state)
+        return Scene(states, told, bool(terminated or truncated))
+
+    def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
+        picture = self._env.render() if self._env.render_mode == "ansi" else None
+        return picture.strip("\n").split("\n") if isinstance(picture, str) else []
+
+
+def _own(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """Return a copy of the environment, which nobody else steps; drawn as text if it can be."""
+    drawn = "ansi" in (env.metadata.get("render_modes") or [])
+    if drawn and env.render_mode != "ansi" and env.spec is not None:
+        return gymnasium.make(env.spec, render_mode="ansi")
+    return copy.deepcopy(env)
