@@ -634,7 +634,7 @@ def record_demos(
     Each demonstration is saved in FILE when it is finished. Those that are there already are kept,
     and their environment is taken if neither --map nor --env is given.
     """
-    from replication.demos.files import load_demos, summary
+    from replication.demos.files import check_demos, load_demos, summary
     from replication.demos.stand_in import gym_task
     from replication.demos.terminal import record
 
@@ -654,6 +654,8 @@ def record_demos(
             kept = f"; what was finished is in {_short(file)}" if file.exists() else ""
             _end(f"interrupted{kept}", 130)
     click.echo(f"{demos.task}: {summary(demos)}\ndemos: {_short(file)}")
+    for doubt in check_demos(file):
+        _say(f"warning: {doubt}")
 
 
 @demos_group.command(epilog="Example: replicate demos check mine.json")

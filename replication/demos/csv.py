@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -68,7 +69,7 @@ def read_csv(
 
 
 def _episodes(text: str, environment: Environment) -> dict[str, _Episode]:
-    reader = csv.reader(text.splitlines())
+    reader = csv.reader(io.StringIO(text, newline=None))
     header = [name.strip() for name in next(reader, [])]
     needed = [name for name in COLUMNS if name != "state" or not _by_cell(header, environment)]
     known = (*COLUMNS, "kind", *(CELL if isinstance(environment, Maze) else ()))

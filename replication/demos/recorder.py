@@ -86,8 +86,9 @@ class Recorder:
         elif key in ("q", "w"):
             self.done = quits or not self._actions
             self._quits = True
-            steps = len(self._actions)
-            self._note = f"{steps} steps are not finished: Enter finishes them, q drops them"
+            number = len(self._actions)
+            steps, them = ("step is", "it") if number == 1 else ("steps are", "them")
+            self._note = f"{number} {steps} not finished: Enter finishes {them}, q drops {them}"
         else:
             self._note = "no such key"
 

@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from replication import Demos, Maze
+from replication.demos.worlds import as_world
+from replication.envs.soccer.field import SoccerField
+from replication.envs.soccer.rules import FORWARD
+from replication.errors import UserError
+
+MAZE = Maze.from_text("""
+    ....G
+    .##..
+    S....
+""")
+UP, DOWN, RIGHT, LEFT = range(4)
+
+
+def drawn(maze: Maze, actions: list[int], columns: int = 80, lines: int = 24) -> list[str]:
+    """Draw a maze without colours."""
+    world = as_world(maze)
+    text = world.draw(actions, world.play(actions, 0), columns, lines)
+    return [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in text]
+
+
+class Drifting(gymnasium.Env[Any, Any]):
+    """An environment that forgets its seed: each episode drifts a step further."""
+
+    observation_space = gymnasium.spaces.Discrete(1000)
+    action_space = gymnasium.spaces.Discrete(2)
+    episodes = 0
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[int, dict[str, Any]]:
+        """Begin one state further than the last time."""
+        self.episodes += 1
+        self.state = self.episodes
+        return self.state, {}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Go on by one."""
+        self.state += 1
+        return self.state, 0.0, False, self.state > 900, {}
+
+
+class Dice:
+    """A random task: both actions lead from state 0 to state 0 or 1, and in state 1 it ends."""
+
+    kind, is_random, actions = "own", True, ("roll", "throw")
+    starts, start_probabilities = np.array([0]), np.array([1.0])
+    successors = np.array([[[0, 1], [0, 1]], [[1, 1], [1, 1]]])
+    probabilities = np.full((2, 2, 2), 0.5)
+    ends = np.array([False, True])
+    replay = None
+
+
+def test_the_way_is_drawn() -> None:
+    """The agent is @; the cells that it left point where it went."""
+    assert drawn(MAZE, []) == [". . . . G", ". # # . .", "@ . . . ."]
+    assert drawn(MAZE, [RIGHT, RIGHT, RIGHT, UP]) == [". . . . G", ". # # @ .", "S > > ^ ."]
+
+
+def test_a_small_terminal_shows_the_agent() -> None:
+    """Where the maze has no room, the part around the agent is drawn."""
+    assert drawn(MAZE, [], columns=4, lines=2) == [". #", "@ ."]
+    assert drawn(MAZE, [RIGHT] * 4, columns=4, lines=2) == [". .", "> @"]
+    assert drawn(MAZE, [], columns=1, lines=1) == ["@"]
+
+
+def test_what_happened_is_told() -> None:
+    """A wall and the goal are named; after the goal it is over."""
+    world = as_world(MAZE)
+    assert world.play([DOWN], 0).told == "hits a wall and stays"
+    end = world.play([RIGHT] * 4 + [UP] * 2, 0)
+    assert (end.told, end.over) == ("reaches the goal [0,4]", True)
+    assert world.play([RIGHT], 0).told == ""
+
+
+def test_soccer_is_played() -> None:
+    """The field has no picture, but states and an end."""
+    world = as_world(SoccerField())
+    scene = world.play([FORWARD], 0)
+    assert len(scene.states) == 2
+    assert world.draw([FORWARD], scene, 80, 24) == []
+
+
+def test_soccer_ends_with_a_goal(soccer_demos: Demos) -> None:
+    """The stored correct demonstration is over at its last step, not before."""
+    world = as_world(soccer_demos.environment)
+    actions = soccer_demos.correct[0].actions.tolist()
+    assert world.play(actions, 0).told == "reaches the gate: a goal"
+    assert not world.play(actions[:-1], 0).over
+
+
+def test_a_maze_of_gymnasium_is_a_maze() -> None:
+    """The environment `replication/Maze-v0` is drawn and recorded as its maze."""
+    env = gymnasium.make("replication/Maze-v0", maze=MAZE)
+    assert as_world(env).environment is MAZE
+
+
+def test_gymnasium_draws_itself() -> None:
+    """An environment that can draw itself as text does so, however it was made."""
+    world = as_world(gymnasium.make("FrozenLake-v1", is_slippery=False))
+    scene = world.play([1, 1], 0)
+    assert scene.states == (0, 4, 8)
+    assert world.draw([1, 1], scene, 80, 24)[-1] == "HFFG"
+
+
+def test_the_end_of_an_episode_is_told() -> None:
+    """A hole ends it, and so does the time limit."""
+    lake = gymnasium.make("FrozenLake-v1", is_slippery=False, max_episode_steps=3)
+    world = as_world(lake)
+    hole = world.play([2, 1], 0)
+    assert (hole.told, hole.over) == ("reward 0, and the episode is over", True)
+    late = world.play([0, 0, 0], 1)
+    assert (late.told, late.over) == ("reward 0, and the episode is over: its time is up", True)
+
+
+def test_luck_repeats_in_an_attempt() -> None:
+    """An undone random move ends up where it did before; another attempt has other luck."""
+    world = as_world(gymnasium.make("FrozenLake-v1"))
+    plays = [world.play([1, 2, 1], attempt).states for attempt in range(20)]
+    assert world.play([1, 2], 19).states == plays[19][:3]
+    assert world.play([1, 2, 1], 19).states == plays[19]
+    assert [world.play([1, 2, 1], attempt).states for attempt in range(20)] == plays
+    assert len(set(plays)) > 1
+
+
+def test_the_users_environment_is_left_alone() -> None:
+    """Nobody else's steps come between ours, and ours not between theirs."""
+    env = Drifting()
+    world = as_world(env)
+    world.play([0, 0], 0)
+    assert env.episodes == 0
+
+
+def test_an_environment_that_does_not_repeat_itself_is_found_out() -> None:
+    """Where a step cannot be undone, that is said, instead of showing another way."""
+    world = as_world(Drifting())
+    assert world.play([0, 0], 0).states == (1, 2, 3)
+    with pytest.raises(UserError, match="does not repeat itself"):
+        world.play([0], 0)
+
+
+def test_a_random_task_is_played_by_its_table() -> None:
+    """Each attempt has its own luck, which does not change, and ends where the table says."""
+    world = as_world(Dice())
+    plays = [world.play([0, 1, 0], attempt) for attempt in range(20)]
+    assert plays == [world.play([0, 1, 0], attempt) for attempt in range(20)]
+    assert len({play.states for play in plays}) > 1
+    assert all(play.over == (play.states[-1] == 1) for play in plays)
+    assert world.play([0, 1], 3).states == plays[3].states[:3]
+
+
+@pytest.mark.parametrize("given", [5, None, gymnasium.make("CartPole-v1")])
+def test_what_has_no_numbers_is_refused(given: object) -> None:
+    """Only environments with numbered states and actions can be recorded."""
+    with pytest.raises(UserError):
+        as_world(given)
