@@ -18,30 +18,45 @@ if TYPE_CHECKING:
     from replication.demos.maze_expert import demonstrate
     from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
+    from replication.demos.tasks import make_demos
     from replication.demos.terminal import record
     from replication.envs.gym import MazeEnv
+    from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
-    from replication.fitting import Fit, fit
+    from replication.envs.tabular import TabularTask
+    from replication.envs.task import TaskError
+    from replication.envs.wrapped_task import Bins, WrappedTask
+    from replication.fitting import fit, fit_many
     from replication.irl import METHODS
+    from replication.learned_reward import LearnedReward
     from replication.paper.params import Params
+    from replication.result import Fit
 
 __version__ = "0.1.0"
 
 __all__ = [
     "METHODS",
+    "Bins",
     "Demo",
     "DemoError",
     "Demos",
     "Fit",
+    "GymTask",
+    "LearnedReward",
     "Maze",
     "MazeEnv",
     "MazeError",
     "Params",
+    "TabularTask",
+    "TaskError",
+    "WrappedTask",
     "check_demos",
     "demonstrate",
     "fit",
+    "fit_many",
     "from_minari",
     "load_demos",
+    "make_demos",
     "read_csv",
     "record",
     "save_demos",
@@ -56,12 +71,19 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.maze_expert": ("demonstrate",),
         "demos.minari": ("from_minari", "to_minari"),
         "demos.model": ("Demo", "Demos"),
+        "demos.tasks": ("make_demos",),
         "demos.terminal": ("record",),
         "envs.gym": ("MazeEnv",),
+        "envs.gym_task": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),
-        "fitting": ("Fit", "fit"),
+        "envs.tabular": ("TabularTask",),
+        "envs.task": ("TaskError",),
+        "envs.wrapped_task": ("Bins", "WrappedTask"),
+        "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),
+        "learned_reward": ("LearnedReward",),
         "paper.params": ("Params",),
+        "result": ("Fit",),
     }
 
     def __getattr__(name):

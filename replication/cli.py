@@ -541,11 +541,9 @@ def learn(
     is reported as such, with exit code 0 unless --strict is given.
     """
     from replication.demos.files import load_demos
-    from replication.fitting import fit
+    from replication.fitting import fit, own_params
     from replication.irl import get_method
-    from replication.paper.params import Params
     from replication.progress import iteration_meter
-    from replication.report.learned import fit_figure
     from replication.report.style import save_figure
 
     _catch_signals()
@@ -554,9 +552,9 @@ def learn(
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
     if "incorrect" in parameters:
         raise UserError("-p incorrect is not taken here; choose the demos with --incorrect SET")
-    params = Params.of(incorrect="all", **parameters)
     with _plain_warnings():
         demos = load_demos(file).select(incorrect or "all")
+    params = own_params(demos, **parameters)
     stem = out / f"{demos.task}-{method}"
     saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
     _check_targets(saved, picture, source=file)
@@ -564,8 +562,7 @@ def learn(
     with iteration_meter() as report:
         result = fit(demos, method=method, params=params, seed=seed, report=report)
     result.save(saved)
-    figure = fit_figure(demos, result.actions, result.weights, result.errors)
-    save_figure(figure, stem, formats=("png",))
+    save_figure(result.plot(), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
     _say(
         f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
@@ -635,8 +632,9 @@ def record_demos(
     and their environment is taken if neither --map nor --env is given.
     """
     from replication.demos.files import check_demos, load_demos, summary
-    from replication.demos.stand_in import gym_task
+    from replication.demos.schema import GymnasiumFields
     from replication.demos.terminal import record
+    from replication.demos.worlds import NAMES
 
     _catch_signals()
     if (map_file and env) or not (map_file or env or file.exists()):
@@ -645,7 +643,10 @@ def record_demos(
         raise UserError("-p and --actions are for --env")
     with _plain_warnings():
         if env:
-            world: Any = gym_task(env, parameters, actions.split(",") if actions else None)
+            known = NAMES.get(env.partition("-")[0])
+            names = actions.split(",") if actions else list(known) if known else None
+            fields = GymnasiumFields(kind="gymnasium", id=env, options=parameters, actions=names)
+            world: Any = fields.build()
         else:
             world = _maze(map_file) if map_file else load_demos(file).environment
         try:
@@ -723,8 +724,8 @@ def choices(id: str | None) -> None:
         for group, members in choice_groups().items():
             click.echo(f"{group[0].upper()}{group[1:]}")
             for entry in members:
-                others = f"{'or ' * bool(entry.alternatives)}{_accepted(entry)}"
-                value = f"{entry.default} ({others})" if others else str(entry.default)
+                others = f"{'or ' * bool(entry.alternatives)}{entry.others}"
+                value = f"{entry.default} ({others})" if entry.others else str(entry.default)
                 _print_item(f"  {entry.id}", value, column)
         click.echo("\nreplicate choices ID shows one of them in full")
         return
@@ -733,15 +734,9 @@ def choices(id: str | None) -> None:
     entry = entries[id.upper()]
     fields = ("id", "place", "open", "default", "rule", "alternatives", "field", "data", "code")
     for key in fields:
-        value = _accepted(entry) if key == "alternatives" else str(getattr(entry, key))
+        value = entry.others if key == "alternatives" else str(getattr(entry, key))
         if value:
             _print_item(f"{key}:", value, 14)
-
-
-def _accepted(entry: Any) -> str:
-    if entry.range is not None:
-        return f"{entry.range[0]:g} to {entry.range[1]:g}"
-    return ", ".join(map(str, entry.alternatives))
 
 
 def _print_item(head: str, text: str, column: int) -> None:

@@ -1,126 +1,40 @@
-"""Learn a reward from a demonstration file: the package's front door for a user's own task."""
+"""Learn a reward from demonstrations: the package's front door for a user's own task."""
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.demos.files import demos_document, parse_demos
+from replication.demos.checks import DemoWarning
+from replication.demos.files import doubts
 from replication.demos.model import Demos
-from replication.errors import UserError
-from replication.files import FileError, read_json, write_file
+from replication.demos.tasks import Trajectory, make_demos
+from replication.envs.environment import Environment
+from replication.envs.task import Task
+from replication.errors import show
 from replication.irl import Method
 from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
+from replication.result import Fit, FitError, open_ends, taken
 from replication.trials.condition import Condition
 
-FORMAT = "replication-fit"
-VERSION = 1
+if TYPE_CHECKING:  # it takes long to import
+    import pandas as pd
 
+ROLLOUTS = 100
+"""Trajectories behind each expectation (Eq. 7) where moves are random."""
+
+PLATEAU = 25
+"""Iterations without a smaller error that end a fit where d = 0 cannot be reached."""
 
 Array = NDArray[np.float64]
-
-
-class FitError(UserError):
-    """A file that does not hold a fit; the message is one line."""
-
-
-@dataclass(frozen=True)
-class Fit:
-    """What was learned from demonstrations, and all that is needed to learn it again.
-
-    Attributes
-    ----------
-    demos, method, params, seed
-        What it was learned from.
-    weights, q
-        Reward weights and Q-table, `[state, action]`.
-    states, actions
-        The last greedy trajectory, [T + 1] and [T].
-    errors
-        The history: d (Eq. 6) before each iteration and after the last one.
-    converged
-        Whether the last error is within the threshold.
-    """
-
-    demos: Demos
-    method: str
-    params: Params
-    seed: int
-    weights: NDArray[np.float64]
-    q: NDArray[np.float64]
-    states: NDArray[np.int64]
-    actions: NDArray[np.int64]
-    errors: NDArray[np.float64]
-    converged: bool
-
-    @property
-    def iterations(self) -> int:
-        """Number of weight updates."""
-        return len(self.errors) - 1
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the fit as one JSON file; numbers keep every bit."""
-        document = {
-            "format": FORMAT,
-            "version": VERSION,
-            "method": self.method,
-            "seed": self.seed,
-            "params": self.params.values(),
-            "iterations": self.iterations,
-            "converged": self.converged,
-            **{name: getattr(self, name).tolist() for name in _ARRAYS},
-            "demos": demos_document(self.demos),
-        }
-        lines = [f'  "{key}": {json.dumps(value)}' for key, value in document.items()]
-        return write_file(path, "{\n" + ",\n".join(lines) + "\n}\n")
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Fit:
-        """Read a fit that was saved.
-
-        Raises
-        ------
-        FitError
-            If the file holds no fit of this version.
-        """
-        try:
-            document: dict[str, Any] = read_json(path)
-            if (document["format"], document["version"]) != (FORMAT, VERSION):
-                raise ValueError(f"it is not a {FORMAT} file of version {VERSION}")
-            arrays: dict[str, Any] = {
-                name: np.array(document[name], dtype=kind) for name, kind in _ARRAYS.items()
-            }
-            return cls(
-                demos=parse_demos(json.dumps(document["demos"]).encode()),
-                method=document["method"],
-                params=Params.of(**document["params"]),
-                seed=document["seed"],
-                converged=document["converged"],
-                **arrays,
-            )
-        except FileError as error:
-            raise FitError(str(error)) from None
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise FitError(f"{path}: cannot be read as a fit ({error!r}); save it again") from None
-
-
-_ARRAYS: dict[str, type] = {
-    "errors": np.float64,
-    "states": np.int64,
-    "actions": np.int64,
-    "weights": np.float64,
-    "q": np.float64,
-}
 
 
 @dataclass(frozen=True)
@@ -142,34 +56,47 @@ class _Watched(Condition):
 
 
 def fit(
-    demos: Demos,
+    demos: Demos | Mapping[str, Iterable[Trajectory]],
     *,
+    task: Environment | None = None,
     method: str = "unified-incorrect",
     params: Params | None = None,
     seed: int = 0,
     report: Callable[[int, float], None] | None = None,
+    **values: Any,
 ) -> Fit:
     """Learn reward weights and a policy from demonstrations.
 
     Parameters
     ----------
     demos
-        Correct and incorrect demonstrations, from :func:`replication.load_demos`.
+        Correct and incorrect demonstrations, from :func:`replication.load_demos`; or lists of them
+        by kind, see :func:`replication.make_demos`, in the `task`.
+    task
+        The environment of such lists: a task of your own, or a maze.
     method
         A name in :data:`replication.METHODS`.
     params
-        Parameters; by default the registered ones with every incorrect demonstration of the file.
+        Parameters; by default those of `own_params`.
     seed
         Root seed: the result equals trial 0 of :func:`replication.trials.run.run_trials` with it.
     report
         Is called at each weight update, with its number and the error d before it.
+    values
+        Single parameters by name, such as ``alpha=0.2``, instead of `params`.
 
     Raises
     ------
     ChoiceError
-        If the method is unknown.
-    DemoError
-        If the demonstrations lack a kind that the parameters ask for.
+        If the method or a parameter is unknown, or a value is out of range.
+    DemoError, TaskError
+        If the task cannot have gone as demonstrated, or the demonstrations lack a kind that the
+        parameters ask for.
+
+    Warns
+    -----
+    DemoWarning
+        If no policy can match the correct demonstrations exactly.
 
     Examples
     --------
@@ -185,19 +112,90 @@ def fit(
     >>> result.converged, result.actions.tolist() == demos.correct[0].actions.tolist()
     (True, True)
     """
-    chosen = params if params is not None else Params.of(incorrect="all")
-    given = (demos, method, chosen)
+    checked = _checked(demos, task)
+    if params is not None and values:
+        raise FitError(f"give {min(values)} = {show(values[min(values)])} or params, not both")
+    chosen = params if params is not None else own_params(checked, **values)
+    given = (checked, method, chosen)
     condition = Condition(*given) if report is None else _Watched(*given, report)
     trial = condition.trial(seed=trial_seeds(seed, 1)[0])
-    return Fit(
-        demos=demos,
+    episode = trial.episodes[taken(trial.errors, chosen)]
+    result = Fit(
+        demos=checked,
         method=method,
         params=chosen,
         seed=seed,
         weights=trial.weights,
         q=trial.q,
-        states=trial.episodes[-1].states,
-        actions=trial.episodes[-1].actions,
+        states=episode.states,
+        actions=episode.actions,
         errors=trial.errors,
         converged=trial.converged,
     )
+    for doubt in open_ends(result):
+        warnings.warn(doubt, DemoWarning, stacklevel=2)
+    return result
+
+
+def fit_many(
+    demos: Demos | Mapping[str, Iterable[Trajectory]],
+    *,
+    seeds: Iterable[int],
+    progress: bool = True,
+    **options: Any,
+) -> pd.DataFrame:
+    """Fit once for each seed; return a table with a row for each.
+
+    Parameters
+    ----------
+    demos, options
+        As for `fit`.
+    seeds
+        Root seeds.
+    progress
+        Whether to show a bar.
+
+    Returns
+    -------
+    DataFrame
+        Columns seed, method, iterations, converged, stopped and error.
+    """
+    import pandas as pd
+    from tqdm.auto import tqdm
+
+    checked = _checked(demos, options.pop("task", None))
+    rows = []
+    for seed in tqdm(list(seeds), desc=checked.task, unit="fit", disable=not progress):
+        result = fit(checked, seed=seed, **options)
+        names = ("seed", "method", "iterations", "converged", "stopped", "error")
+        rows.append({name: getattr(result, name) for name in names})
+    return pd.DataFrame(rows)
+
+
+def own_params(demos: Demos, **values: Any) -> Params:
+    """Return the parameters that suit demonstrations of a user's own, with some values replaced.
+
+    All incorrect demonstrations are used. Where moves are random, `ROLLOUTS` trajectories stand
+    behind each expectation; where moves are random or correct demonstrations differ, a fit ends
+    after `PLATEAU` iterations without a smaller error. All else is as in the register.
+    """
+    is_random = isinstance(demos.environment, Task) and demos.environment.is_random
+    ways = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
+    suited = {
+        "incorrect": "all",
+        "rollouts": ROLLOUTS if is_random else 1,
+        "plateau": PLATEAU if is_random or len(ways) > 1 else 0,
+    }
+    return Params.of(**suited | values)
+
+
+def _checked(demos: Demos | Mapping[str, Iterable[Trajectory]], task: Environment | None) -> Demos:
+    """Return demonstrations of the task, with a warning where they cannot be matched."""
+    if isinstance(demos, Demos):
+        return demos if task is None else replace(demos, environment=task)
+    if task is None:
+        raise FitError("demonstrations in plain lists need their environment: fit(..., task=...)")
+    made = make_demos(task, demos)
+    for doubt in doubts(made):
+        warnings.warn(doubt, DemoWarning, stacklevel=3)
+    return made

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from replication.demos.checks import DemoError, check_moves
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
 from replication.envs.maze import Maze, MazeError
+from replication.envs.task import TaskError
 from replication.errors import show, unknown
 from replication.files import printable, read_text
 
@@ -171,9 +173,19 @@ def _demo(environment: Environment, name: str, episode: _Episode) -> Demo:
     states = episode.states
     try:
         if len(states) == len(actions):
-            states = [*states, int(environment.replay(actions)[-1])]
+            states = [*states, _last_state(environment, actions)]
         demo = Demo(f"episode {name}", episode.kind, np.array(states), actions)
         check_moves(environment, demo.name, demo.actions, demo.states)
     except DemoError as error:
         raise DemoError(f"lines {episode.lines[0]} to {episode.lines[-1]}: {error}") from None
     return demo
+
+
+def _last_state(environment: Environment, actions: NDArray[np.int64]) -> int:
+    try:
+        return int(environment.replay(actions)[-1])
+    except TaskError:
+        raise DemoError(
+            "moves or the start are random; end the episode by a row with its last state and no "
+            "action"
+        ) from None

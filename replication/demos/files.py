@@ -10,15 +10,30 @@ from typing import Any
 
 from replication.demos.checks import DemoError, DemoWarning, action_numbers, replay
 from replication.demos.model import Demo, Demos, state_action_pairs
-from replication.demos.schema import FORMAT, VERSION, CorrectFields, IncorrectFields, read_fields
+from replication.demos.schema import (
+    FORMAT,
+    OWN,
+    VERSION,
+    CorrectFields,
+    IncorrectFields,
+    read_fields,
+)
 from replication.demos.strict_json import layout, read_content
 from replication.envs.environment import Environment
+from replication.envs.task import Task
 from replication.errors import compact, show
 from replication.files import printable, reason, write_file
 
 
-def load_demos(path: str | os.PathLike[str]) -> Demos:
+def load_demos(path: str | os.PathLike[str], *, task: Environment | None = None) -> Demos:
     """Read and check a demonstration file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    task
+        The environment in which they were made, where the file cannot make it.
 
     Raises
     ------
@@ -31,19 +46,19 @@ def load_demos(path: str | os.PathLike[str]) -> Demos:
         If no deterministic policy can match the correct demos exactly, or if an incorrect demo has
         no effect.
     """
-    demos = _read(path)
-    for warning in _warnings(demos):
+    demos = _read(path, task)
+    for warning in doubts(demos):
         warnings.warn(f"{printable(path)}: {warning}", DemoWarning, stacklevel=2)
     return demos
 
 
 def check_demos(path: str | os.PathLike[str]) -> list[str]:
     """Check a demonstration file; returns its warnings, raises `DemoError` like `load_demos`."""
-    return [f"{printable(path)}: {warning}" for warning in _warnings(_read(path))]
+    return [f"{printable(path)}: {warning}" for warning in doubts(_read(path))]
 
 
-def parse_demos(content: bytes) -> Demos:
-    """Read and check the content of a demonstration file.
+def parse_demos(content: bytes, task: Environment | None = None) -> Demos:
+    """Read and check the content of a demonstration file, in the environment that is given if any.
 
     Raises
     ------
@@ -51,7 +66,10 @@ def parse_demos(content: bytes) -> Demos:
         On the first thing that is wrong, in one line that names the place and the fix.
     """
     fields = read_fields(content)
-    environment = fields.environment.build()
+    environment = fields.environment.build() if task is None else task
+    written = fields.environment.model_dump(exclude_none=True)
+    if task is not None and not written.items() <= task.describe().items():
+        raise DemoError("environment: the file was made in another one than the task that is given")
     return Demos(
         task=fields.task,
         environment=environment,
@@ -94,7 +112,8 @@ def save_demos(demos: Demos, path: str | os.PathLike[str]) -> None:
     with _naming(path):
         try:
             content = (layout(demos_document(demos)) + "\n").encode()
-            parse_demos(content)
+            own = demos.environment.kind == OWN
+            parse_demos(content, demos.environment if own else None)
             write_file(path, content)
         except DemoError:
             raise
@@ -117,7 +136,7 @@ def _demo(environment: Environment, kind: str, fields: CorrectFields | Incorrect
     return Demo(fields.name, kind, states, actions)
 
 
-def _warnings(demos: Demos) -> list[str]:
+def doubts(demos: Demos) -> list[str]:
     """Return why usable demonstrations may not be learned exactly, or may have no effect."""
     messages = []
     conflicts = demos.conflicts()
@@ -130,7 +149,8 @@ def _warnings(demos: Demos) -> list[str]:
             f" (one of {len(conflicts)} such states): d = 0 cannot be reached"
         )
     paths = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
-    if len(paths) > 1:
+    is_random = isinstance(demos.environment, Task) and demos.environment.is_random
+    if len(paths) > 1 and not is_random:
         messages.append(
             f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
             "which a single deterministic trajectory cannot match"
@@ -145,9 +165,9 @@ def _warnings(demos: Demos) -> list[str]:
     return messages
 
 
-def _read(path: str | os.PathLike[str]) -> Demos:
+def _read(path: str | os.PathLike[str], task: Environment | None = None) -> Demos:
     with _naming(path):
-        return parse_demos(read_content(path))
+        return parse_demos(read_content(path), task)
 
 
 @contextmanager

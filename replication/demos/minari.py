@@ -17,6 +17,7 @@ from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.demos.schema import FORMAT, VERSION, read_fields
 from replication.envs.environment import Environment
+from replication.envs.task import Task
 from replication.errors import UserError, show
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
     for number, demo in enumerate(all_demos):
         ended = np.zeros(len(demo.actions), dtype=bool)
         over = ended.copy()
-        ended[-1] = environment.goal_step(demo.actions) is not None
+        ended[-1] = _is_over(environment, demo)
         over[-1] = not ended[-1]
         episode = EpisodeBuffer(
             id=number,
@@ -88,6 +89,13 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
     except (ValueError, OSError, ImportError) as error:
         raise UserError(f"dataset {show(dataset_id)}: {_line(error)}") from None
     return dataset
+
+
+def _is_over(environment: Environment, demo: Demo) -> bool:
+    """Return whether an episode ended by itself, as far as that is known."""
+    if isinstance(environment, Task):
+        return bool(environment.is_over(demo.states, demo.actions))
+    return environment.goal_step(demo.actions) is not None
 
 
 def from_minari(

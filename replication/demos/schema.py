@@ -32,13 +32,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from replication.demos.checks import DemoError
 from replication.demos.model import FIXES, KIND, NAME, TASK
 from replication.demos.strict_json import read_json
+from replication.envs.environment import Environment
 from replication.envs.maze import MAX_SIDE, Maze, MazeError
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import SoccerParams
+from replication.envs.task import Task, TaskError
 from replication.errors import compact, show, unknown
+
+MAX_STATES = 2**27
 
 FORMAT = "replication-demos"
 VERSION = 1
+OWN = "own"
+"""The kind of an environment that only its own program can make."""
 
 
 # --- what a file holds -----------------------------------------------------------------------
@@ -55,8 +61,8 @@ class _Fields(BaseModel):
 _Name = Annotated[str, Field(min_length=1, max_length=100, pattern=NAME)]
 _Cell = Annotated[list[Annotated[int, Field(ge=0, lt=MAX_SIDE)]], Field(min_length=2, max_length=2)]
 _Numbers = Annotated[
-    list[Annotated[int, Field(ge=0, lt=MAX_SIDE)]], Field(min_length=2, max_length=3)
-]  # of a state: row and column in a maze; column, row and detection in soccer
+    list[Annotated[int, Field(ge=0, lt=MAX_STATES)]], Field(min_length=1, max_length=3)
+]  # of a state: row and column in a maze; column, row and detection in soccer; else its own
 _Actions = Annotated[list[Annotated[str, Field(max_length=100)]], Field(fail_fast=True)]
 _States = Annotated[list[_Numbers], Field(fail_fast=True)]
 
@@ -122,6 +128,62 @@ class SoccerFields(
         return field
 
 
+class GymnasiumFields(
+    _Fields,
+    json_schema_extra={
+        "description": "A Gymnasium environment that is registered under its ``id``; ``actions`` "
+        "names its actions."
+    },
+):
+    """The fields of a Gymnasium environment."""
+
+    kind: Literal["gymnasium"]
+    id: _Name
+    options: dict[str, Any] = {}
+    reset_seed: Annotated[int, Field(ge=0)] | None = None
+    actions: _Actions | None = None
+
+    def build(self) -> Task:
+        """Make the environment; raises `DemoError` if Gymnasium cannot."""
+        import gymnasium
+
+        from replication.envs.gym_task import GymTask
+
+        if ":" in self.id:  # would import a module that the file names
+            raise DemoError(
+                f"environment.id: {show(self.id)} names a module; import it in Python and give the "
+                "task itself: load_demos(path, task=...)"
+            )
+        try:
+            env = gymnasium.make(self.id, **self.options)
+            return GymTask(env, actions=self.actions, reset_seed=self.reset_seed)
+        except (gymnasium.error.Error, TaskError, TypeError, ValueError, KeyError) as error:
+            first = str(error).splitlines()[0] if str(error) else repr(error)
+            raise DemoError(f"environment: Gymnasium cannot make it: {first}") from None
+
+
+class OwnFields(
+    _Fields,
+    json_schema_extra={
+        "description": "An environment that only its own program can make: whoever reads the "
+        "file gives it."
+    },
+):
+    """The fields of an environment that no file can make."""
+
+    kind: Literal["own"]
+    states: Annotated[int, Field(ge=1)]
+    actions: _Actions
+    digest: str | None = None
+
+    def build(self) -> Environment:
+        """Refuse: there is nothing to make it of."""
+        raise DemoError(
+            "environment: only its own program can make it; give it in Python: "
+            "load_demos(path, task=...)"
+        )
+
+
 def _check_given(field: str, given: list[Any] | None, derived: list[Any]) -> None:
     if given is not None and given != derived:
         raise DemoError(
@@ -168,7 +230,9 @@ class DemoFile(
     version: Literal[1]
     task: Annotated[str, Field(max_length=100, pattern=TASK)]
     description: Annotated[str, Field(max_length=10_000)] = ""
-    environment: Annotated[MazeFields | SoccerFields, Field(discriminator="kind")]
+    environment: Annotated[
+        MazeFields | SoccerFields | GymnasiumFields | OwnFields, Field(discriminator="kind")
+    ]
     # `Demos` checks that there is at least one, with a clearer message.
     correct: Annotated[
         list[CorrectFields],
@@ -208,7 +272,12 @@ def read_fields(content: bytes) -> DemoFile:
         raise DemoError(_explain(error, data)) from None
 
 
-_ENVIRONMENTS: dict[str, type[BaseModel]] = {"maze": MazeFields, "soccer": SoccerFields}
+_ENVIRONMENTS: dict[str, type[BaseModel]] = {
+    "maze": MazeFields,
+    "soccer": SoccerFields,
+    "gymnasium": GymnasiumFields,
+    "own": OwnFields,
+}
 _MODELS: dict[str, type[BaseModel]] = {"correct": CorrectFields, "incorrect": IncorrectFields}
 
 

@@ -25,7 +25,7 @@ from replication.demos.recorder import Recorder
 from replication.demos.worlds import as_world
 from replication.envs.environment import Environment
 from replication.errors import UserError
-from replication.files import check_writable, printable
+from replication.files import check_writable
 
 POLL = 0.25
 """Seconds between two looks at the terminal's size."""
@@ -68,15 +68,10 @@ def record(
     _check_terminal()
     world = as_world(environment)
     if path is not None:
-        if world.environment.kind == "own":
-            raise UserError("a file cannot hold this task; leave out `path`, and keep what returns")
         check_writable(Path(path).absolute().parent)
-    present = load_demos(path) if path is not None and Path(path).exists() else None
-    if present and present.environment.describe() != world.environment.describe():
-        raise UserError(
-            f"{printable(path or '')} is of another environment; choose another file, or leave out "
-            "the environment to go on with the file's"
-        )
+    present = None
+    if path is not None and Path(path).exists():
+        present = load_demos(path, task=world.environment)
     name = present.task if present else task or _task_name(path)
 
     def save(demos: Demos) -> None:

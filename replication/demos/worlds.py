@@ -11,16 +11,27 @@ import gymnasium
 import numpy as np
 
 from replication.demos.checks import goal_phrase, no_op_phrase
-from replication.demos.stand_in import GymTask
 from replication.envs.environment import Environment
 from replication.envs.gym import MazeEnv
+from replication.envs.gym_task import GymTask
 from replication.envs.maze import Maze
+from replication.envs.tabular import TabularTask
+from replication.envs.task import Task
+from replication.envs.wrapped_task import WrappedTask
 from replication.errors import UserError, clip
 
 AGENT, WAY, GOAL, WALL, PLAIN = "\x1b[1;31m", "\x1b[36m", "\x1b[1;32m", "\x1b[2m", "\x1b[0m"
 """How a terminal is told to colour a cell of a maze."""
 
 HEADS = {"up": "^", "down": "v", "right": ">", "left": "<"}
+
+
+NAMES = {
+    "FrozenLake": ("left", "down", "right", "up"),
+    "CliffWalking": ("up", "right", "down", "left"),
+    "Taxi": ("south", "north", "east", "west", "pick up", "drop off"),
+}
+"""What Gymnasium's documentation calls the actions of its environments that draw text."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +86,27 @@ def as_world(given: Any) -> World:
     """
     if isinstance(given, gymnasium.Env):
         bare = given.unwrapped
-        return _Known(bare.maze) if isinstance(bare, MazeEnv) else _Stepped(given, GymTask(given))
+        if isinstance(bare, MazeEnv):
+            return _Known(bare.maze)
+        given = GymTask(given, actions=action_names(given))
+    if isinstance(given, GymTask | WrappedTask):
+        return _Stepped(given)
+    if isinstance(given, TabularTask) and given.is_random:
+        return _Random(given)
     if not hasattr(given, "replay"):
         raise UserError(f"give a maze, a task or a Gymnasium environment, not {clip(repr(given))}")
-    if isinstance(inner := getattr(given, "env", None), gymnasium.Env):
-        return _Stepped(inner, given)
-    return _Random(given) if getattr(given, "is_random", False) else _Known(given)
+    return _Known(given)
+
+
+def action_names(env: gymnasium.Env[Any, Any]) -> tuple[str, ...] | None:
+    """Return what the actions of an environment are called, if its documentation names them.
+
+    Examples
+    --------
+    >>> action_names(gymnasium.make("FrozenLake-v1"))
+    ('left', 'down', 'right', 'up')
+    """
+    return NAMES.get(env.spec.name) if env.spec and not env.spec.namespace else None
 
 
 @dataclass(frozen=True)
@@ -101,9 +127,9 @@ class _Known:
         return []
 
 
-def _ended(environment: Any, actions: Sequence[int]) -> bool:
-    """Return whether the episode is over; a task's own end need not be its goal."""
-    if hasattr(environment, "walk"):
+def _ended(environment: Environment, actions: Sequence[int]) -> bool:
+    """Return whether the episode is over; a task's end need not be its goal."""
+    if isinstance(environment, Task):
         return environment.walk(actions).end is not None
     return environment.goal_step(actions) is not None
 
@@ -119,15 +145,21 @@ def _told(environment: Environment, *, over: bool, stays: bool) -> str:
 class _Random:
     """A task whose table of moves has several outcomes; an attempt is the seed of the luck."""
 
-    environment: Any
+    environment: TabularTask
 
     def play(self, actions: Sequence[int], attempt: int) -> Scene:
         task, luck = self.environment, np.random.default_rng(attempt)
-        states = [int(luck.choice(task.starts, p=task.start_probabilities))]
+        table = task.table
+
+        def drawn(pair: int) -> int:
+            outcomes = slice(table.first[pair], table.first[pair + 1])
+            chances = table.probabilities[outcomes]
+            return int(luck.choice(table.successors[outcomes], p=chances / chances.sum()))
+
+        states = [drawn(task.n_states * task.n_actions)]  # the start stands behind all pairs
         for action in actions:
-            pair = states[-1], action
-            states.append(int(luck.choice(task.successors[pair], p=task.probabilities[pair])))
-        over, stays = bool(task.ends[states[-1]]), states[-1:] == states[-2:-1]
+            states.append(drawn(states[-1] * task.n_actions + action))
+        over, stays = bool(table.ends[states[-1]]), states[-1:] == states[-2:-1]
         return Scene(tuple(states), _told(task, over=over, stays=stays), over)
 
     def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
@@ -171,10 +203,15 @@ def _around(place: int, length: int, room: int) -> range:
 class _Stepped:
     """A Gymnasium environment: it is stepped, and begins anew only where a step is undone."""
 
-    def __init__(self, env: gymnasium.Env[Any, Any], environment: Environment) -> None:
-        self.environment = environment
-        self._env = _own(env)
-        self._number: Callable[[Any], int] = getattr(environment, "state_of", int)
+    def __init__(self, task: GymTask | WrappedTask) -> None:
+        self.environment = task
+        inner = task.task if isinstance(task, GymTask) else task
+        self._number: Callable[[Any], int] = int
+        if isinstance(inner, WrappedTask):
+            self._env, self._number = copy.deepcopy(inner.env), inner.number
+        else:
+            self._env = _drawn_as_text(task.env)
+        self._seed = task.reset_seed if isinstance(task, GymTask) else None
         self._attempt = -1
         self._actions: list[int] = []
         self._scenes: list[Scene] = []
@@ -182,7 +219,7 @@ class _Stepped:
     def play(self, actions: Sequence[int], attempt: int) -> Scene:
         before = self._scenes if attempt == self._attempt else []
         if not before or self._actions != [*actions[: len(self._actions)]]:
-            state, _ = self._env.reset(seed=attempt)
+            state, _ = self._env.reset(seed=attempt if self._seed is None else self._seed)
             self._attempt, self._actions, self._scenes = (
                 attempt,
                 [],
@@ -212,9 +249,9 @@ class _Stepped:
         return picture.strip("\n").split("\n") if isinstance(picture, str) else []
 
 
-def _own(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
-    """Return a copy of the environment, which nobody else steps; drawn as text if it can be."""
-    drawn = "ansi" in (env.metadata.get("render_modes") or [])
-    if drawn and env.render_mode != "ansi" and env.spec is not None:
+def _drawn_as_text(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """Return a copy of the environment, which nobody else steps; one that draws if it can."""
+    can = "ansi" in (env.metadata.get("render_modes") or [])
+    if can and env.render_mode != "ansi" and env.spec is not None:
         return gymnasium.make(env.spec, render_mode="ansi")
     return copy.deepcopy(env)

@@ -233,11 +233,11 @@ def _check(id: str, value: Value) -> None:
     elif id not in load_choices():
         raise ChoiceError(f"there is no choice {id!r}")
     elif id == "SOCCER-EPISODES":
-        load_choices()["EPISODES"].check(value)
+        load_choices()["EPISODES"].registered(value)
     elif (id, value) != ("DEMO-SHAPE", RANDOM):
         if not load_choices()[id].field:
             raise ChoiceError(f"{id} has no parameter that could be changed")
-        load_choices()[id].check(value)
+        load_choices()[id].registered(value)
 
 
 # --- the specifications ----------------------------------------------------------------------

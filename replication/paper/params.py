@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from replication.errors import unknown
-from replication.paper.register import ChoiceError, Chosen, Value, choice, load_choices
+from replication.paper.register import ChoiceError, Chosen, Value, choice
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class Params:
 
         Examples
         --------
-        >>> Params.of(alpha=0.1, q_start="reset").differences()
-        {'Q-START': 'reset', 'ALPHA': 0.1}
+        >>> Params.of(alpha=0.2, q_start="reset").update.alpha
+        0.2
         """
         owners = {name: part for part, kind in _PARTS.items() for name in _names(kind)}
         chosen: dict[str, dict[str, Any]] = {part: {} for part in _PARTS}
@@ -101,17 +101,6 @@ class Params:
             for part, kind in _PARTS.items()
             for name in _names(kind)
         }
-
-    def differences(self) -> dict[str, Value]:
-        """Return the values that differ from the registered defaults, by the id of their choice."""
-        changed: dict[str, Value] = {}
-        for part in _PARTS:
-            concern = getattr(self, part)
-            for item in fields(concern):
-                entry = load_choices()[item.metadata["choice"]]
-                if getattr(concern, item.name) != entry.default:
-                    changed[entry.id] = getattr(concern, item.name)
-        return changed
 
 
 _PARTS: Mapping[str, type[Chosen]] = {

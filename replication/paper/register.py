@@ -2,7 +2,7 @@
 
 The register itself is the data file ``choices.toml``. A dataclass field declared with
 :func:`choice` takes its default from the register and accepts every number that the mathematics
-allow, and the registered words; `Choice.is_registered` tells what is compared with the paper.
+allow, and the registered words; `Choice.registered` takes only what is compared with the paper.
 """
 
 from __future__ import annotations
@@ -47,9 +47,29 @@ class Choice:
             return f"{kind} from {low} to {high}"
         return ", ".join(repr(value) for value in (self.default, *self.alternatives))
 
-    def is_registered(self, value: Value) -> bool:
-        """Return whether a value is compared with the paper: the default, or one of the others."""
-        return value == self.default or value in self.alternatives or not self.alternatives
+    @property
+    def others(self) -> str:
+        """What is compared with the paper besides the default, in words; "" if nothing is."""
+        if self.alternatives or self.range is None:
+            return ", ".join(map(str, self.alternatives))
+        return f"{self.range[0]:g} to {self.range[1]:g}"
+
+    def registered(self, value: Any) -> Value:
+        """Return `value` as `check` does, if it is among those that are compared with the paper.
+
+        Raises
+        ------
+        ChoiceError
+            If it is not.
+        """
+        checked = self.check(value)
+        values = (self.default, *self.alternatives)
+        if self.alternatives and checked not in values:
+            raise ChoiceError(
+                f"{self.field} = {value!r} is not registered (choice {self.id}): use "
+                f"{', '.join(map(repr, values))}"
+            )
+        return checked
 
     def check(self, value: Any) -> Value:
         """Return `value` in the type of the default.

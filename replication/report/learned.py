@@ -15,6 +15,7 @@ from replication.demos.model import Demos
 from replication.envs.maze import Maze
 from replication.envs.soccer.field import SoccerField, as_soccer
 from replication.envs.soccer.replay import replay
+from replication.envs.task import Task
 from replication.report.field import demonstrations as demonstrated
 from replication.report.field import draw_ways
 from replication.report.maze import (
@@ -34,16 +35,20 @@ PATH: dict[str, Any] = {"color": COLOUR, "lw": 4, "alpha": 0.45, "solid_capstyle
 @settled
 def fit_figure(
     demos: Demos,
+    states: NDArray[np.int64],
     actions: NDArray[np.int64],
     weights: NDArray[np.float64],
     errors: NDArray[np.float64],
 ) -> Figure:
     """Draw what was learned: the path with all demonstrations, and the errors.
 
-    `actions` make the learned path, `weights` are `[state, action]`, `errors` is d by iteration. A
-    maze shows the reward, too.
+    `states` [T + 1] and `actions` [T] make the learned path, `weights` are `[state, action]`,
+    `errors` is d by iteration. A maze shows the reward, too; a task that has no map shows it along
+    the path.
     """
     environment = demos.environment
+    if isinstance(environment, Task):
+        return _task_figure(states, actions, weights, errors)
     if isinstance(environment, Maze):
         figure, (path, reward, error) = canvas(1, 3, height=3.2)
         handles = _draw_in_maze(path, environment, demos, actions)
@@ -59,14 +64,40 @@ def fit_figure(
         figure, (path, error) = canvas(1, 2, height=3.9)
         handles = _draw_on_field(path, as_soccer(environment), demos, actions)
     path.set_title("(a) learned path")
-    error.plot(errors, color=COLOUR, marker="o", ms=2)
-    title = f"({'c' if isinstance(environment, Maze) else 'b'}) error"
-    error.set(title=title, xlabel="iteration", ylabel="error d", ylim=(0, None))
-    error.set_xlim(0, max(1, len(errors) - 1))
+    _draw_errors(error, errors, "c" if isinstance(environment, Maze) else "b")
     error.set(box_aspect=1, anchor="N")
-    error.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     legend_below(figure, [*handles, Line2D([], [], label="learned path", **PATH)])
     return figure
+
+
+def _task_figure(
+    states: NDArray[np.int64],
+    actions: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    errors: NDArray[np.float64],
+) -> Figure:
+    """Draw the reward along the learned path, and the errors."""
+    figure, (reward, error) = canvas(1, 2, height=2.8)
+    steps = np.arange(1, len(actions) + 1)
+    others = weights[states[:-1]].copy()
+    taken = others[np.arange(len(actions)), actions]
+    others[np.arange(len(actions)), actions] = -np.inf
+    handles = reward.plot(steps, taken, color=COLOUR, marker="o", ms=3, label="action taken")
+    if weights.shape[1] > 1:
+        best = others.max(axis=1)
+        handles += reward.plot(steps, best, color="0.5", marker="s", ms=3, label="best other one")
+    reward.set(title="(a) reward along the learned path", xlabel="step", ylabel="weight (no unit)")
+    reward.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    _draw_errors(error, errors, "b")
+    legend_below(figure, handles)
+    return figure
+
+
+def _draw_errors(panel: Axes, errors: NDArray[np.float64], letter: str) -> None:
+    panel.plot(errors, color=COLOUR, marker="o", ms=2)
+    panel.set(title=f"({letter}) error", xlabel="iteration", ylabel="error d", ylim=(0, None))
+    panel.set_xlim(0, max(1, len(errors) - 1))
+    panel.xaxis.set_major_locator(MaxNLocator(5, integer=True))
 
 
 def _draw_in_maze(

@@ -65,7 +65,7 @@ def _section(entry: Choice) -> Iterator[str]:
     if rest:
         yield f"{rest}\n"
     yield f"**Ours:** `{entry.default}`. {entry.rule}"
-    yield f"**Also accepted:** {_alternatives(entry)}.\n"
+    yield f"**Also compared with the paper:** {entry.others or 'nothing else'}.\n"
     yield f"{{.provenance}}\n{entry.id} · {entry.place} · `{where}`\n"
 
 
@@ -86,9 +86,3 @@ def _split(text: str) -> tuple[str, str]:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _alternatives(entry: Choice) -> str:
-    if entry.range is not None:
-        return f"{entry.range[0]:g} to {entry.range[1]:g}"
-    return ", ".join(f"`{value}`" for value in entry.alternatives) or "nothing else"

@@ -10,7 +10,12 @@ from replication.irl.agent import Agent
 from replication.paper.params import Params
 from replication.paper.register import ChoiceError
 
-AGENTS = {"maze": "replication.trials.table_agent", "soccer": "replication.trials.soccer_agent"}
+AGENTS = {
+    "maze": "replication.trials.table_agent",
+    "soccer": "replication.trials.soccer_agent",
+    "gymnasium": "replication.trials.task_agent",
+    "own": "replication.trials.task_agent",
+}
 """The module that makes the agent for each kind of environment.
 
 They are named, not imported, so that the key of a trial covers the code of its own task only.

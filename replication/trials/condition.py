@@ -15,6 +15,7 @@ from replication.irl.methods import Method, get_method
 from replication.paper.params import Params
 from replication.trials.agents import make_agent
 
+
 @dataclass(frozen=True)
 class Condition:
     """What all trials of a condition have in common.

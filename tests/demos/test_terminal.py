@@ -182,6 +182,37 @@ def test_python_records_as_well(tmp_path: Path) -> None:
     assert at.settings == at.before
 
 
+def test_a_gymnasium_environment_is_recorded_in_a_file(tmp_path: Path) -> None:
+    """The file makes the environment again, with its options and actions, and is continued.
+
+    Nothing stands between the two but the file.
+    """
+    at = Typist(*RECORD, "--env", "FrozenLake-v1", "-p", "is_slippery", "false", cwd=tmp_path)
+    at.see("HFFG")
+    at.press("\x1b[B" * 2 + RIGHT + "\x1b[B" + RIGHT * 2 + "\r", "> correct")
+    at.press("\rq", "demos: mine.json")
+    assert at.end() == 0
+    at = Typist(*RECORD, cwd=tmp_path)
+    at.see("HFFG")
+    at.press(RIGHT + DOWN + "\rhole\rq", "mine: 1 correct, 1 hole")
+    assert at.end() == 0
+    demos = load_demos(tmp_path / FILE)
+    assert demos.environment.describe()["options"]["is_slippery"] is False
+    assert demos.correct[0].states.tolist() == [0, 4, 8, 9, 13, 14, 15]
+    assert demos.incorrect[0].states.tolist() == [0, 1, 5]
+
+
+def test_random_moves_are_recorded_with_their_luck(tmp_path: Path) -> None:
+    """On slippery ice the states are kept as they came."""
+    at = Typist(*RECORD, "--env", "FrozenLake-v1", cwd=tmp_path)
+    at.see("HFFG")
+    at.press("1111", "step ")
+    at.press("\r\rq", "demos: mine.json")
+    assert at.end() == 0
+    (demo,) = load_demos(tmp_path / FILE).correct
+    assert demo.states[0] == 0
+
+
 def test_without_a_terminal_the_other_ways_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -201,9 +232,9 @@ def pretended(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_another_environment_is_not_mixed_in(tmp_path: Path) -> None:
     """A file keeps the environment that it has."""
     save_demos(demonstrate("mine", Maze.from_text(MAP)), tmp_path / FILE)
-    with pytest.raises(UserError, match=r"mine\.json is of another environment; choose"):
+    with pytest.raises(UserError, match=r"mine\.json: environment: .* another one"):
         record(Maze(("S.G",)), tmp_path / FILE)
-    with pytest.raises(UserError, match="mine"):
+    with pytest.raises(UserError, match=r"mine\.json: environment: .* another one"):
         record(gymnasium.make("FrozenLake-v1"), tmp_path / FILE)
 
 

@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from replication import Demos, Maze
+from replication import Bins, Demos, GymTask, Maze, TabularTask, WrappedTask
 from replication.demos.worlds import as_world
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import FORWARD
@@ -47,15 +47,12 @@ class Drifting(gymnasium.Env[Any, Any]):
         return self.state, 0.0, False, self.state > 900, {}
 
 
-class Dice:
-    """A random task: both actions lead from state 0 to state 0 or 1, and in state 1 it ends."""
-
-    kind, is_random, actions = "own", True, ("roll", "throw")
-    starts, start_probabilities = np.array([0]), np.array([1.0])
-    successors = np.array([[[0, 1], [0, 1]], [[1, 1], [1, 1]]])
-    probabilities = np.full((2, 2, 2), 0.5)
-    ends = np.array([False, True])
-    replay = None
+DICE = TabularTask(
+    np.array([[[0.5, 0.5], [0.5, 0.5]], [[0.0, 1.0], [0.0, 1.0]]]),
+    terminal=[1],
+    actions=("roll", "throw"),
+)
+"""Both actions lead from state 0 to state 0 or 1, where it ends."""
 
 
 def test_the_way_is_drawn() -> None:
@@ -130,25 +127,55 @@ def test_luck_repeats_in_an_attempt() -> None:
     assert len(set(plays)) > 1
 
 
-def test_the_users_environment_is_left_alone() -> None:
-    """Nobody else's steps come between ours, and ours not between theirs."""
-    env = Drifting()
-    world = as_world(env)
-    world.play([0, 0], 0)
-    assert env.episodes == 0
+def test_nobody_else_steps_it() -> None:
+    """What is recorded goes on where it was, although its task is walked to check something."""
+    lake = gymnasium.make("FrozenLake-v1", is_slippery=False)
+    for task in (GymTask(lake), WrappedTask(lake, int, 16)):
+        world = as_world(task)
+        world.play([1, 1], 0)
+        task.walk([2, 2])
+        lake.reset(seed=1)
+        assert world.play([1, 1, 2], 0).states == (0, 4, 8, 9)
+
+
+def test_an_observation_is_numbered() -> None:
+    """A task that numbers observations is recorded by its numbers."""
+    car = WrappedTask(gymnasium.make("MountainCar-v0"), Bins([-1.2, -0.07], [0.6, 0.07], [9, 9]))
+    states = as_world(car).play([2, 2, 2], 5).states
+    assert len(states) == 4
+    assert all(0 <= state < 81 for state in states)
+
+
+def test_a_start_that_was_chosen_is_kept() -> None:
+    """Where every episode starts by one seed, so does what is recorded."""
+    env = gymnasium.make("Taxi-v4")
+    fixed = as_world(GymTask(env, reset_seed=3))
+    assert {fixed.play([], attempt).states for attempt in range(5)} == {fixed.play([], 9).states}
+    free = as_world(GymTask(env))
+    assert len({free.play([], attempt).states for attempt in range(5)}) > 1
 
 
 def test_an_environment_that_does_not_repeat_itself_is_found_out() -> None:
     """Where a step cannot be undone, that is said, instead of showing another way."""
     world = as_world(Drifting())
-    assert world.play([0, 0], 0).states == (1, 2, 3)
+    first = world.play([0, 0], 0).states
+    assert first == (first[0], first[0] + 1, first[0] + 2)
     with pytest.raises(UserError, match="does not repeat itself"):
         world.play([0], 0)
 
 
+def test_a_table_is_played() -> None:
+    """A task whose moves are not random needs no luck."""
+    world = as_world(TabularTask([[0, 1], [0, 2], [2, 2]], terminal=[2], actions=("back", "on")))
+    scene = world.play([1, 1], 0)
+    assert (scene.states, scene.over) == ((0, 1, 2), True)
+    assert scene.told == "reaches an end of the episode"
+    assert world.play([0], 0).told == "changes nothing"
+
+
 def test_a_random_task_is_played_by_its_table() -> None:
     """Each attempt has its own luck, which does not change, and ends where the table says."""
-    world = as_world(Dice())
+    world = as_world(DICE)
     plays = [world.play([0, 1, 0], attempt) for attempt in range(20)]
     assert plays == [world.play([0, 1, 0], attempt) for attempt in range(20)]
     assert len({play.states for play in plays}) > 1

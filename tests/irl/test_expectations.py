@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from replication import Demos
-from replication.irl.expectations import mean_expectations, feature_expectations, visited
+from replication.irl.expectations import feature_expectations, mean_expectations, visited
 
 SHAPE = (5, 3)
 PAIRS = st.lists(st.tuples(st.integers(0, 4), st.integers(0, 2)), max_size=30)

@@ -12,8 +12,8 @@ from replication import Demos
 from replication.irl import Trial, get_method, run_trial
 from replication.irl.agent import Agent, Episode
 from replication.irl.expectations import (
-    mean_expectations,
     feature_expectations,
+    mean_expectations,
     norm,
     visited,
 )

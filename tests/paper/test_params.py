@@ -8,7 +8,7 @@ import pytest
 
 from replication.demos.maze_expert import Expert
 from replication.paper.params import Demonstrations, Learner, Loop, Params, Update
-from replication.paper.register import Choice, ChoiceError, Chosen, Value, load_choices
+from replication.paper.register import Choice, ChoiceError, Chosen, load_choices
 from replication.trials.measures import Report
 
 KINDS: tuple[type[Chosen], ...] = (Demonstrations, Learner, Loop, Update, Expert, Report)
@@ -49,27 +49,6 @@ def test_everything_else_is_refused(kind: type[Chosen], name: str, entry: Choice
     for value in wrong:
         with pytest.raises(ChoiceError, match=rf"^{kind.__name__}\.{name} = .*{entry.id}"):
             kind(**{name: value})
-
-
-def test_defaults_do_not_differ() -> None:
-    """Default parameters differ from the register in nothing, named or not."""
-    assert Params().differences() == {}
-    assert Params.of() == Params()
-    assert Params.of(**Params().values()).differences() == {}
-
-
-@pytest.mark.parametrize(
-    ("name", "entry"), [(n, e) for k, n, e in FIELDS if k not in (Expert, Report)], ids=lambda x: x
-)
-def test_a_change_is_listed_by_its_id(name: str, entry: Choice) -> None:
-    """One value that is not the default is the one difference, under the id of its choice."""
-    others: list[Value] = list(entry.alternatives)
-    if entry.range is not None:
-        others = [type(entry.default)(entry.range[0])]
-    for value in others:
-        changed = Params.of(**{name: value})
-        assert changed.differences() == {entry.id: value}
-        assert changed != Params()
 
 
 def test_values_make_the_same_parameters_again() -> None:

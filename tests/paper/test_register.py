@@ -32,7 +32,7 @@ CLASSES = [
 WHOLE = Choice("N", "p", "o", 5, "r", range=(1, 9), field="Some.n")
 REAL = Choice("X", "p", "o", 0.5, "r", range=(0.0, 1.0), field="Some.x")
 WORD = Choice("WORD", "p", "o", "new", "r", alternatives=("kept", "reset"), field="Some.word")
-STEP = Choice("STEP", "p", "o", 4, "r", alternatives=(1, 2), field="Some.step")
+STEP = Choice("STEP", "p", "o", 4, "r", alternatives=(1, 2), range=(1, 9), field="Some.step")
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=IDS)
@@ -45,14 +45,25 @@ def test_entry_is_whole(entry: Choice) -> None:
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=IDS)
 def test_values_are_distinct_and_of_one_type(entry: Choice) -> None:
-    """A parameter has alternatives or a range around its default; any other choice has neither."""
+    """A number has a range, a word alternatives, and what is no parameter neither."""
     values = (entry.default, *entry.alternatives)
     assert len(set(values)) == len(values)
     assert {type(value) for value in values} == {type(entry.default)}
-    assert (bool(entry.alternatives) + (entry.range is not None)) == bool(entry.field)
+    number = isinstance(entry.default, int | float)
+    assert (entry.range is not None) == (bool(entry.field) and number)
+    assert bool(entry.alternatives) or entry.range or not entry.field
     if entry.range is not None:
-        assert isinstance(entry.default, int | float)
-        assert entry.range[0] <= entry.default <= entry.range[1]
+        assert all(entry.range[0] <= value <= entry.range[1] for value in values)
+
+
+def test_what_is_registered_is_told_from_what_is_accepted() -> None:
+    """The default and the alternatives are registered; without alternatives, the whole range is."""
+    assert [STEP.registered(value) for value in (4, 1, 2.0)] == [4, 1, 2]
+    assert (WHOLE.registered(7), WORD.registered("kept"), STEP.check(3)) == (7, "kept", 3)
+    message = r"^Some\.step = 3 is not registered \(choice STEP\): use 4, 1, 2$"
+    with pytest.raises(ChoiceError, match=message):
+        STEP.registered(3)
+    assert (WHOLE.others, WORD.others, STEP.others) == ("1 to 9", "kept, reset", "1, 2")
 
 
 def test_fields_and_entries_match() -> None:
@@ -128,7 +139,7 @@ def test_wrong_numbers_are_refused(wrong: Any) -> None:
     if wrong not in (0, 5):
         with pytest.raises(ChoiceError, match=r"choice X\): use a number from 0\.0 to 1\.0$"):
             REAL.check(wrong)
-    with pytest.raises(ChoiceError, match=r"\(choice STEP\): use 4, 1, 2$"):
+    with pytest.raises(ChoiceError, match=r"\(choice STEP\): use a whole number from 1 to 9$"):
         STEP.check(wrong)
 
 

@@ -85,9 +85,10 @@ def drawings(
 ) -> dict[str, Figure]:
     """Draw each picture from its file, and what was learned from a user's own demonstrations."""
     weights, errors = np.linspace(-1, 1, 42 * 4).reshape(42, 4), np.linspace(2, 0, 9)
+    one, other = small_demos.correct[0], soccer_demos.incorrect[0]
     fits = {
-        "fit": fit_figure(small_demos, small_demos.correct[0].actions, weights, errors),
-        "soccer fit": fit_figure(soccer_demos, soccer_demos.incorrect[0].actions, weights, errors),
+        "fit": fit_figure(small_demos, one.states, one.actions, weights, errors),
+        "soccer fit": fit_figure(soccer_demos, other.states, other.actions, weights, errors),
     }
     return {**fits, **{kind: pictures[kind].draw(tables[kind]) for kind in pictures}}
 

@@ -23,8 +23,8 @@ from replication.paper.register import ChoiceError
 from replication.trials import soccer_agent, table_agent
 from replication.trials.agents import make_agent
 from replication.trials.condition import Condition
-from replication.trials.table_agent import TableAgent
 from replication.trials.soccer_agent import SoccerAgent
+from replication.trials.table_agent import TableAgent
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def test_agents_refuse_the_other_kind_of_environment(
 
 def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
     """What the compiled maze learner cannot do is refused, not ignored."""
-    with pytest.raises(ChoiceError, match=r"^in mazes the exploration .*: set epsilon_end = 0\.3"):
+    with pytest.raises(ChoiceError, match=r"^here the exploration .*: set epsilon_end = 0\.3"):
         make_agent(small_demos.environment, Params.of(epsilon=0.3))
 
 
@@ -130,7 +130,7 @@ def test_maze_agent_learns_by_its_fields(small_demos: Demos, change: dict[str, A
 def test_unusual_values_are_not_the_defaults() -> None:
     """No field of the learner has its default above, but for those that act elsewhere."""
     usual = {field.name: getattr(Learner(), field.name) for field in dataclasses.fields(Learner)}
-    assert usual.keys() - UNUSUAL.keys() == {"q_start", "goal_value"}
+    assert usual.keys() - UNUSUAL.keys() == {"q_start", "goal_value", "solver"}
     assert all(usual[name] != value for name, value in UNUSUAL.items())
     assert UNUSUAL.keys() == {name for change in CHANGES for name in change}
 

@@ -1,0 +1,56 @@
+"""A learned reward in a Gymnasium environment, for any other learner to train on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+
+from replication.result import Fit
+
+
+class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Replaces an environment's reward by a learned one, R(s, a) of state s and action a.
+
+    Parameters
+    ----------
+    env
+        The environment, as it is used by the other learner. Its observations are those of the
+        task: state numbers, or whatever the task's function numbers.
+    result
+        What was learned in it, or in one with the same states.
+
+    Notes
+    -----
+    The reward says what the demonstrations say with the discount of `result.params`: train with the
+    same one.
+
+    Examples
+    --------
+    >>> from replication import GymTask, fit
+    >>> env = gymnasium.make("FrozenLake-v1", is_slippery=False)
+    >>> result = fit({"correct": [[1, 1, 2, 1, 2, 2]]}, task=GymTask(env), seed=1)
+    >>> learned = LearnedReward(env, result)
+    >>> _ = learned.reset(seed=1)
+    >>> learned.step(1)[1] == result.weights.item(0, 1)
+    True
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], result: Fit) -> None:
+        super().__init__(env)
+        self.result = result
+        self._observation: Any = None
+        self._first = getattr(env.action_space, "start", 0)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode."""
+        self._observation, info = self.env.reset(seed=seed, options=options)
+        return self._observation, info
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take an action; raises `FitError` if the state is not one of the task."""
+        reward = self.result.reward(self._observation, int(action - self._first))
+        self._observation, _, ended, cut, info = self.env.step(action)
+        return self._observation, reward, ended, cut, info

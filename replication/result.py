@@ -1,0 +1,248 @@
+"""What was learned: reward, policy, path and errors, and what to do with them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication.demos.files import demos_document, doubts, parse_demos
+from replication.demos.model import Demos
+from replication.demos.tasks import action_numbers
+from replication.envs.environment import Environment
+from replication.envs.task import Task
+from replication.envs.wrapped_task import WrappedTask
+from replication.errors import UserError, show
+from replication.files import FileError, read_json, write_file
+from replication.paper.params import Params
+
+if TYPE_CHECKING:  # it takes long to import
+    from matplotlib.figure import Figure
+
+FORMAT = "replication-fit"
+VERSION = 1
+
+
+class FitError(UserError):
+    """A file that holds no fit, or a state that a fit does not know; the message is one line."""
+
+
+@dataclass(frozen=True, repr=False)
+class Fit:
+    """What was learned from demonstrations, and all that is needed to learn it again.
+
+    Attributes
+    ----------
+    demos, method, params, seed
+        What it was learned from.
+    weights, q
+        Reward weights and Q-table, `[state, action]`: the last ones or, where d = 0 cannot be
+        reached, those of the smallest error.
+    states, actions
+        The greedy trajectory that goes with them, [T + 1] and [T].
+    errors
+        The history: d (Eq. 6) before each iteration and after the last one.
+    converged
+        Whether the last error is within the threshold.
+
+    Examples
+    --------
+    >>> from replication import TabularTask, fit
+    >>> corridor = TabularTask([[0, 1], [0, 2], [2, 2]], terminal=[2], actions=("back", "on"))
+    >>> result = fit({"correct": [["on", "on"]]}, task=corridor, seed=1)
+    >>> result
+    <Fit of 'mine' by unified-incorrect: converged after 1 iteration>
+    >>> result.predict(1), result.path
+    ('on', [((0,), 'on'), ((1,), 'on'), ((2,), '')])
+    """
+
+    demos: Demos
+    method: str
+    params: Params
+    seed: int
+    weights: NDArray[np.float64]
+    q: NDArray[np.float64]
+    states: NDArray[np.int64]
+    actions: NDArray[np.int64]
+    errors: NDArray[np.float64]
+    converged: bool
+
+    def __repr__(self) -> str:
+        ended = "converged" if self.converged else "not converged"
+        return f"<Fit of {self.demos.task!r} by {self.method}: {ended} after {self._number}>"
+
+    @property
+    def iterations(self) -> int:
+        """Number of weight updates."""
+        return len(self.errors) - 1
+
+    @property
+    def stopped(self) -> str:
+        """Why it ended: "threshold", "plateau" or "cap"."""
+        if self.converged:
+            return "threshold"
+        return "cap" if self.iterations == self.params.loop.max_iterations else "plateau"
+
+    @property
+    def error(self) -> float:
+        """The error d of the weights: the last one or, where a plateau may end it, the least."""
+        return float(self.errors[taken(self.errors, self.params)])
+
+    @property
+    def path(self) -> list[tuple[tuple[int, ...], str]]:
+        """The learned trajectory: each state as files write it, and the action taken there."""
+        environment = self.demos.environment
+        names = [*(environment.actions[action] for action in self.actions), ""]
+        cells = (environment.cell(int(state)) for state in self.states)
+        return list(zip(cells, names, strict=True))
+
+    def summary(self) -> str:
+        """Return what was learned, from what, and why it stopped, in a few lines."""
+        demos, loop = self.demos, self.params.loop
+        why = {
+            "threshold": f"converged: d is within the threshold {loop.threshold:g}",
+            "plateau": f"not converged: no smaller d in {loop.plateau} iterations",
+            "cap": f"not converged: ended at the cap of {loop.max_iterations} iterations",
+        }
+        kinds = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
+        lines = [
+            f"task        {demos.task}: {demos.environment.n_states} states, "
+            f"{demos.environment.n_actions} actions",
+            f"demos       {', '.join([f'{len(demos.correct)} correct', *kinds])}",
+            f"method      {self.method}, seed {self.seed}",
+            f"result      {why[self.stopped]}; {self._number}, d = {self.error:.4g}",
+        ]
+        if not self.converged and loop.plateau:
+            nearest = int(self.errors.argmin())
+            lines.append(f"            reward and policy are those of iteration {nearest}")
+        lines += [f"note        {doubt}" for doubt in (*doubts(demos), *open_ends(self))]
+        path = [",".join(map(str, cell)) for cell, _ in self.path]
+        shown = path if len(path) <= 12 else [*path[:8], "...", *path[-3:]]
+        return "\n".join([*lines, f"path        {' '.join(shown)} ({len(self.actions)} steps)"])
+
+    def policy(self) -> NDArray[np.int64]:
+        """Return the greedy action of each state, int64 [state]; of equals the first."""
+        return self.q.argmax(axis=1)
+
+    def predict(self, state: Any) -> str:
+        """Return the name of the action that the policy takes.
+
+        `state` is the number of a state, its numbers in files (such as row and column), or an
+        observation that the task can number. Raises `FitError` if there is none such.
+        """
+        return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
+
+    def reward(self, state: Any, action: str | int) -> float:
+        """Return the learned reward of an action; `state` as for `predict`.
+
+        Raises
+        ------
+        FitError, TaskError
+            If there is no such state or action.
+        """
+        (number,) = action_numbers(self.demos.environment, [action])
+        return float(self.weights[self._state(state), number])
+
+    def plot(self) -> Figure:
+        """Return a figure of the learned trajectory, the reward and the errors."""
+        from replication.report.learned import fit_figure
+
+        return fit_figure(self.demos, self.states, self.actions, self.weights, self.errors)
+
+    @property
+    def _number(self) -> str:
+        return f"{self.iterations} iteration{'s' * (self.iterations != 1)}"
+
+    def _state(self, state: Any) -> int:
+        """Return the number of a state."""
+        environment = self.demos.environment
+        if isinstance(environment, WrappedTask) and not isinstance(state, Integral):
+            return environment.number(state)
+        if isinstance(state, Sequence):
+            cells = environment.cells(np.arange(environment.n_states))
+            found = np.flatnonzero((cells == np.array(state)).all(axis=1))
+            if found.size:
+                return int(found[0])
+        if isinstance(state, Integral) and 0 <= int(state) < environment.n_states:
+            return int(state)
+        last = environment.n_states - 1
+        raise FitError(f"there is no state {show(state)}; states are 0..{last}")
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fit as one JSON file; numbers keep every bit."""
+        document = {
+            "format": FORMAT,
+            "version": VERSION,
+            "method": self.method,
+            "seed": self.seed,
+            "params": self.params.values(),
+            "iterations": self.iterations,
+            "converged": self.converged,
+            **{name: getattr(self, name).tolist() for name in _ARRAYS},
+            "demos": demos_document(self.demos),
+        }
+        lines = [f'  "{key}": {json.dumps(value)}' for key, value in document.items()]
+        return write_file(path, "{\n" + ",\n".join(lines) + "\n}\n")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, task: Environment | None = None) -> Fit:
+        """Read a fit that was saved; `task` as for :func:`replication.load_demos`.
+
+        Raises
+        ------
+        FitError
+            If the file holds no fit of this version.
+        """
+        try:
+            document: dict[str, Any] = read_json(path)
+            if (document["format"], document["version"]) != (FORMAT, VERSION):
+                raise ValueError(f"it is not a {FORMAT} file of version {VERSION}")
+            arrays: dict[str, Any] = {
+                name: np.array(document[name], dtype=kind) for name, kind in _ARRAYS.items()
+            }
+            return cls(
+                demos=parse_demos(json.dumps(document["demos"]).encode(), task),
+                method=document["method"],
+                params=Params.of(**document["params"]),
+                seed=document["seed"],
+                converged=document["converged"],
+                **arrays,
+            )
+        except FileError as error:
+            raise FitError(str(error)) from None
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise FitError(f"{path}: cannot be read as a fit ({error!r}); save it again") from None
+
+
+_ARRAYS: dict[str, type] = {
+    "errors": np.float64,
+    "states": np.int64,
+    "actions": np.int64,
+    "weights": np.float64,
+    "q": np.float64,
+}
+
+
+def taken(errors: NDArray[np.float64], params: Params) -> int:
+    """Return the iteration whose weights are the result, see :class:`replication.irl.Trial`."""
+    return int(errors.argmin()) if params.loop.plateau else len(errors) - 1
+
+
+def open_ends(result: Fit) -> list[str]:
+    """Return why d = 0 is out of reach if a correct demonstration stops before its episode ends."""
+    task, horizon = result.demos.environment, result.params.learner.horizon
+    if not isinstance(task, Task):
+        return []
+    return [
+        f"correct demo {show(demo.name)} stops after {len(demo.actions)} steps, but the episode "
+        f"goes on: the agent drives on to the horizon, so set horizon = {len(demo.actions)}"
+        for demo in result.demos.correct
+        if len(demo.actions) < horizon and task.is_over(demo.states, demo.actions) is False
+    ][:1]
