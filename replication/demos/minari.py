@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -19,6 +20,7 @@ from replication.demos.schema import FORMAT, VERSION, read_fields
 from replication.envs.environment import Environment
 from replication.envs.task import Task
 from replication.errors import UserError, show
+from replication.files import parse_json
 
 if TYPE_CHECKING:
     from minari import MinariDataset
@@ -159,7 +161,11 @@ def _demo(episode: Any, facts: dict[str, Any]) -> Demo:
 
 
 def _about(dataset: Any) -> dict[str, Any]:
-    return json.loads(dataset.storage.metadata.get(ABOUT, "{}"))
+    """Return what :func:`to_minari` noted; nothing if somebody else wrote the dataset."""
+    with suppress(ValueError, TypeError):
+        about = parse_json(dataset.storage.metadata.get(ABOUT, "{}"))
+        return about if isinstance(about, dict) else {}
+    return {}
 
 
 def _environment(about: dict[str, Any]) -> Environment:

@@ -4,11 +4,12 @@ import csv
 import io
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from replication import DemoError, Demos, load_demos, read_csv
+from replication import DemoError, Demos, TabularTask, load_demos, read_csv
 from replication.files import FileError
 from tests.conftest import Spoil
 from tests.demos.example import MAZE, STORED
@@ -123,6 +124,17 @@ def test_what_is_wrong_is_said_with_its_line(
     with pytest.raises(DemoError, match=rf"mine\.csv: {message}") as caught:
         read(tmp_path, GOOD.replace(old, new, 1))
     assert "\n" not in str(caught.value)
+
+
+def test_random_moves_need_their_last_state(tmp_path: Path) -> None:
+    """Where an action may lead elsewhere, replaying it cannot tell where it led."""
+    task = TabularTask(np.array([[[0.5, 0.5]], [[0.0, 1.0]]]), terminal=[1])
+    path = tmp_path / "mine.csv"
+    path.write_text("episode,step,state,action\n1,0,0,0\n1,1,0,0\n1,2,1,\n")
+    assert read_csv(path, task).correct[0].states.tolist() == [0, 0, 1]
+    path.write_text("episode,step,state,action\n1,0,0,0\n1,1,0,0\n")
+    with pytest.raises(DemoError, match=r"mine\.csv: lines 2 to 3: .* random; end the episode by"):
+        read_csv(path, task)
 
 
 @given(data=st.data())

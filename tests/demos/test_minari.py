@@ -10,7 +10,17 @@ import gymnasium
 import numpy as np
 import pytest
 
-from replication import DemoError, Demos, Maze, from_minari, load_demos, to_minari
+from replication import (
+    DemoError,
+    Demos,
+    GymTask,
+    Maze,
+    TabularTask,
+    from_minari,
+    load_demos,
+    make_demos,
+    to_minari,
+)
 from replication.errors import UserError
 from tests.demos.example import STORED
 
@@ -38,6 +48,29 @@ def test_the_round_trip_changes_nothing(path: Path) -> None:
     dataset = written(before)
     assert from_minari(dataset) == before
     assert from_minari("test/demos-v0", before.environment) == before
+
+
+def test_gymnasium_comes_back_from_its_name() -> None:
+    """A dataset makes its environment again, with options and the names of actions."""
+    env = gymnasium.make("FrozenLake-v1", is_slippery=False)
+    task = GymTask(env, actions=("left", "down", "right", "up"))
+    before = make_demos(task, {"correct": [[1, 1, 2, 1, 2, 2]], "hole": [[2, 1]], "idle": [[0]]})
+    dataset = written(before)
+    ended = [bool(episode.terminations[-1]) for episode in dataset.iterate_episodes()]
+    assert ended == [True, True, False]
+    after = from_minari(dataset)
+    assert (after.correct, after.incorrect) == (before.correct, before.incorrect)
+    assert after.environment.describe() == task.describe()
+
+
+def test_a_task_of_ones_own_must_be_given() -> None:
+    """What only a program can make is asked for; random moves are kept as they came."""
+    task = TabularTask(np.array([[[0.5, 0.5]], [[0.0, 1.0]]]), terminal=[1])
+    before = make_demos(task, {"correct": [([0, 0, 0, 1], [0, 0, 0])]})
+    dataset = written(before)
+    assert from_minari(dataset, task).correct == before.correct
+    with pytest.raises(UserError, match="give `environment`"):
+        from_minari(dataset)
 
 
 def test_others_can_read_it(small_demos: Demos) -> None:
