@@ -634,7 +634,6 @@ def record_demos(
     from replication.demos.files import check_demos, load_demos, summary
     from replication.demos.schema import GymnasiumFields
     from replication.demos.terminal import record
-    from replication.demos.worlds import NAMES
 
     _catch_signals()
     if (map_file and env) or not (map_file or env or file.exists()):
@@ -643,10 +642,10 @@ def record_demos(
         raise UserError("-p and --actions are for --env")
     with _plain_warnings():
         if env:
-            known = NAMES.get(env.partition("-")[0])
-            names = actions.split(",") if actions else list(known) if known else None
+            names = actions.split(",") if actions else None
             fields = GymnasiumFields(kind="gymnasium", id=env, options=parameters, actions=names)
-            world: Any = fields.build()
+            task: Any = fields.build()
+            world = task if actions else task.env
         else:
             world = _maze(map_file) if map_file else load_demos(file).environment
         try:

@@ -18,6 +18,9 @@ from replication.errors import UserError, compact
 FRAME = 0.25
 """Seconds that a replay shows a step."""
 
+LEAST = 10
+"""Lines that a picture may have before the legend of keys takes room from it."""
+
 
 class Recorder:
     """Turns keys into demonstrations; each is saved when it is finished.
@@ -221,11 +224,12 @@ class Recorder:
             keys = []
         else:
             keys = ["", *legend(environment.actions, columns)]
-        picture = self._draw(columns, lines)
-        if len(head + picture + below + keys) > lines:
+        room = lines - len(head) - len(below)
+        if room - len(keys) < min(len(self._draw(columns, lines)), LEAST):
             keys = []
-        room = max(lines - len(head) - len(below), 1)
-        return "\n".join([*head, *self._draw(columns, room), *below, *keys][:lines])
+        picture = self._draw(columns, max(room - len(keys), 1))
+        text = [*head, *picture, *below, *keys]
+        return "\n".join(text[-lines:] if self._question else text[:lines])
 
     def _draw(self, columns: int, lines: int) -> list[str]:
         return self._world.draw(self._seen, self._scene, columns, lines)

@@ -27,11 +27,11 @@ HEADS = {"up": "^", "down": "v", "right": ">", "left": "<"}
 
 
 NAMES = {
-    "FrozenLake": ("left", "down", "right", "up"),
-    "CliffWalking": ("up", "right", "down", "left"),
-    "Taxi": ("south", "north", "east", "west", "pick up", "drop off"),
+    "FrozenLakeEnv": ("left", "down", "right", "up"),
+    "CliffWalkingEnv": ("up", "right", "down", "left"),
+    "TaxiEnv": ("south", "north", "east", "west", "pick up", "drop off"),
 }
-"""What Gymnasium's documentation calls the actions of its environments that draw text."""
+"""What Gymnasium's documentation calls the actions of its environments that draw text, by class."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def as_world(given: Any) -> World:
         bare = given.unwrapped
         if isinstance(bare, MazeEnv):
             return _Known(bare.maze)
-        given = GymTask(given, actions=action_names(given))
+        given = GymTask(given, actions=NAMES.get(type(bare).__name__))
     if isinstance(given, GymTask | WrappedTask):
         return _Stepped(given)
     if isinstance(given, TabularTask) and given.is_random:
@@ -96,17 +96,6 @@ def as_world(given: Any) -> World:
     if not hasattr(given, "replay"):
         raise UserError(f"give a maze, a task or a Gymnasium environment, not {clip(repr(given))}")
     return _Known(given)
-
-
-def action_names(env: gymnasium.Env[Any, Any]) -> tuple[str, ...] | None:
-    """Return what the actions of an environment are called, if its documentation names them.
-
-    Examples
-    --------
-    >>> action_names(gymnasium.make("FrozenLake-v1"))
-    ('left', 'down', 'right', 'up')
-    """
-    return NAMES.get(env.spec.name) if env.spec and not env.spec.namespace else None
 
 
 @dataclass(frozen=True)

@@ -199,7 +199,17 @@ def test_every_terminal_is_large_enough(columns: int, lines: int, keys: list[str
     """The screen never has more lines than the terminal; some lines show the agent."""
     screen = shown(recorder(*keys), columns, lines)
     assert len(screen.splitlines()) <= lines
-    assert lines < 3 or "@" in screen
+    if keys and keys[-1] == "enter" and len(keys) < len(CORRECT):
+        assert lines < 7 or "> correct" in screen
+    else:
+        assert lines < 3 or "@" in screen
+
+
+def test_a_large_maze_leaves_room_for_the_keys() -> None:
+    """In a usual terminal a part of the maze is shown rather than none of the keys."""
+    tall = Recorder(as_world(Maze(("S", *"." * 40, "G"))), "tall")
+    assert "Enter finish" in shown(tall, 80, 24)
+    assert "Enter finish" not in shown(tall, 80, 14)
 
 
 def test_gymnasium_is_recorded() -> None:

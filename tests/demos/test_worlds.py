@@ -107,6 +107,23 @@ def test_gymnasium_draws_itself() -> None:
     assert world.draw([1, 1], scene, 80, 24)[-1] == "HFFG"
 
 
+@pytest.mark.parametrize(
+    ("id", "name", "leads_to"),
+    [
+        ("FrozenLake-v1", "right", 1),
+        ("FrozenLake8x8-v1", "down", 8),
+        ("CliffWalking-v1", "up", 24),
+        ("Taxi-v4", "east", None),
+    ],
+)
+def test_actions_that_are_documented_have_names(id: str, name: str, leads_to: int | None) -> None:
+    """The names of Gymnasium's documentation are those of what the actions do."""
+    options = {"is_slippery": False} if "Lake" in id else {}
+    world = as_world(gymnasium.make(id, **options))
+    states = world.play([world.environment.actions.index(name)], 3).states
+    assert leads_to is None or states[1] == leads_to
+
+
 def test_the_end_of_an_episode_is_told() -> None:
     """A hole ends it, and so does the time limit."""
     lake = gymnasium.make("FrozenLake-v1", is_slippery=False, max_episode_steps=3)
