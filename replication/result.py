@@ -19,7 +19,7 @@ from replication.demos.tasks import action_numbers
 from replication.envs.environment import Environment
 from replication.envs.task import Task
 from replication.envs.wrapped_task import WrappedTask
-from replication.errors import UserError, show
+from replication.errors import UserError, clip, show
 from replication.files import FileError, read_json, write_file
 from replication.paper.params import Params
 
@@ -140,13 +140,7 @@ class Fit:
         return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
 
     def reward(self, state: Any, action: str | int) -> float:
-        """Return the learned reward of an action; `state` as for `predict`.
-
-        Raises
-        ------
-        FitError, TaskError
-            If there is no such state or action.
-        """
+        """Return the learned reward R(s, a); state and errors as for `predict`."""
         (number,) = action_numbers(self.demos.environment, [action])
         return float(self.weights[self._state(state), number])
 
@@ -173,7 +167,7 @@ class Fit:
         if isinstance(state, Integral) and 0 <= int(state) < environment.n_states:
             return int(state)
         last = environment.n_states - 1
-        raise FitError(f"there is no state {show(state)}; states are 0..{last}")
+        raise FitError(f"there is no state {clip(repr(state))}; states are 0..{last}")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the fit as one JSON file; numbers keep every bit."""

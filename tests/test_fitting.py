@@ -1,17 +1,20 @@
 from __future__ import annotations
 
-import json
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
-from replication import Demos, Fit, Params, fit
-from replication.fitting import FitError
+from replication import Demos, Fit, GymTask, Maze, Params, TabularTask, fit, fit_many, make_demos
+from replication.demos.checks import DemoWarning
+from replication.errors import UserError
+from replication.fitting import PLATEAU, ROLLOUTS, own_params
+from replication.learning.planning import plan
 from replication.trials.condition import Condition
 from replication.trials.run import run_trials
 from replication.trials.store import Store
-from tests.conftest import Spoil
 
 FEW = Params.of(incorrect="all", episodes=300, horizon=50)
 
@@ -41,56 +44,6 @@ def test_fit_is_trial_0_of_the_same_root(fitted: Fit, small_demos: Demos, store_
     np.testing.assert_array_equal(fitted.actions, trial.episodes[-1].actions)
 
 
-def test_saved_fit_loads_with_every_bit(fitted: Fit, tmp_path: Path) -> None:
-    """Save and load are inverse, and saving again writes the same bytes."""
-    path = fitted.save(tmp_path / "fit.json")
-    loaded = Fit.load(path)
-    for name in ("weights", "q", "states", "actions", "errors"):
-        np.testing.assert_array_equal(getattr(loaded, name), getattr(fitted, name))
-    assert (loaded.method, loaded.params, loaded.seed, loaded.converged) == (
-        fitted.method,
-        fitted.params,
-        fitted.seed,
-        fitted.converged,
-    )
-    assert loaded.demos == fitted.demos
-    assert loaded.save(tmp_path / "again.json").read_bytes() == path.read_bytes()
-
-
-def test_saved_fit_is_plain_json(fitted: Fit, tmp_path: Path) -> None:
-    """Other programs can read the file without this package."""
-    document = json.loads(fitted.save(tmp_path / "fit.json").read_text(encoding="utf-8"))
-    assert document["format"] == "replication-fit"
-    assert np.array(document["weights"]).shape == (fitted.demos.environment.n_states, 4)
-
-
-@pytest.mark.parametrize(
-    "text", ["", "{}", "[]", '{"format": "replication-fit", "version": 9}', '{"format": "other"}']
-)
-def test_other_files_are_refused_in_one_line(text: str, tmp_path: Path) -> None:
-    """A file that holds no fit gives one clear error with its name."""
-    path = tmp_path / "broken.json"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(FitError, match=r"broken\.json") as caught:
-        Fit.load(path)
-    assert "\n" not in str(caught.value)
-
-
-def test_whatever_is_in_the_place_of_a_fit(tmp_path: Path, spoil: Spoil) -> None:
-    """A pipe, a device, a folder, a huge file and JSON that is none are refused in one line."""
-    spoil(tmp_path / "fit.json")
-    with pytest.raises(FitError, match=r"fit\.json: is [^\n]+$"):
-        Fit.load(tmp_path / "fit.json")
-
-
-def test_truncated_fit_is_refused(fitted: Fit, tmp_path: Path) -> None:
-    """Half a file is not taken for a whole one."""
-    path = fitted.save(tmp_path / "fit.json")
-    path.write_bytes(path.read_bytes()[:-200])
-    with pytest.raises(FitError):
-        Fit.load(path)
-
-
 def test_another_seed_gives_another_course(fitted: Fit, small_demos: Demos) -> None:
     """The seed matters, and the same seed gives the same bits."""
     again, other = (fit(small_demos, params=FEW, seed=seed) for seed in (3, 4))
@@ -104,3 +57,131 @@ def test_each_update_is_reported(fitted: Fit, small_demos: Demos) -> None:
     again = fit(small_demos, params=FEW, seed=3, report=lambda *news: told.append(news))
     assert told == list(enumerate(fitted.errors[:-1], start=1))
     np.testing.assert_array_equal(again.q, fitted.q)
+
+
+# --- tasks of one's own ----------------------------------------------------------------------
+
+LAKE = ("left", "down", "right", "up")
+ACROSS = ["down", "down", "right", "right", "down", "right"]
+ALONG = ["right", "right", "down", "down", "down", "right"]
+
+
+def lake(*, slippery: bool = False) -> GymTask:
+    """Return the frozen lake."""
+    env = gymnasium.make("FrozenLake-v1", is_slippery=slippery, max_episode_steps=1000)
+    return GymTask(env, actions=LAKE)
+
+
+@pytest.mark.parametrize("method", ["adaboost", "unified", "unified-incorrect"])
+def test_every_method_learns_gymnasium_tasks(method: str) -> None:
+    """FrozenLake and CliffWalking, which nobody here wrote, are learned exactly."""
+    cliff = GymTask(gymnasium.make("CliffWalking-v1"), actions=("up", "right", "down", "left"))
+    for task, way in ((lake(), ACROSS), (cliff, ["up", *["right"] * 11, "down"])):
+        result = fit({"correct": [way], "other": [way[:1]]}, task=task, method=method, seed=1)
+        assert result.converged
+        assert [action for _, action in result.path[:-1]] == way
+
+
+def test_two_ways_end_on_a_plateau_with_a_word() -> None:
+    """Correct demonstrations that differ give the nearest reward, and the fit says why it ended."""
+    with pytest.warns(DemoWarning, match="2 different trajectories"):
+        result = fit({"correct": [ACROSS, ALONG]}, task=lake(), seed=1)
+    assert (result.stopped, result.converged) == ("plateau", False)
+    assert result.iterations == result.errors.argmin() + PLATEAU
+    assert result.error == result.errors.min()
+    assert [action for _, action in result.path[:-1]] in (ACROSS, ALONG)
+    assert "no smaller d in 25 iterations" in result.summary()
+
+
+def test_slippery_ice_is_learned_from_many_demonstrations() -> None:
+    """Where moves are random, the policy of the demonstrations comes out again."""
+    task = lake(slippery=True)
+    table = task.env.unwrapped.P  # type: ignore[attr-defined]
+    reward = np.array(
+        [[sum(p * r for p, _, r, _ in table[s][a]) for a in range(4)] for s in range(16)]
+    )
+    policy = plan(reward, task.task.table.ahead, gamma=0.99).argmax(axis=1)  # type: ignore[union-attr]
+    ways: list[Any] = []
+    for seed in range(60):
+        states, actions, over = [int(task.env.reset(seed=seed)[0])], list[int](), False
+        while not over:
+            actions.append(int(policy[states[-1]]))
+            state, _, over, *_ = task.env.step(actions[-1])
+            states.append(int(state))
+        ways.append((states, actions))
+    result = fit({"correct": ways}, task=task, seed=1)
+    assert result.stopped == "plateau"
+    assert result.error < 0.25 * result.errors[0]
+    often = [0, 4, 8, 9, 10, 14]
+    assert (result.policy()[often] == policy[often]).mean() >= 5 / 6
+
+
+def test_own_parameters_suit_the_task() -> None:
+    """Random moves get many trajectories; a plateau may end what cannot be matched."""
+    sure, coin = lake(), TabularTask(np.array([[[0.5, 0.5]], [[0.0, 1.0]]]), terminal=[1])
+    one = own_params(make_demos(sure, {"correct": [ACROSS]}))
+    two = own_params(make_demos(sure, {"correct": [ACROSS, ALONG]}))
+    odds = own_params(make_demos(coin, {"correct": [([0, 1], [0])]}))
+    assert [p.loop.rollouts for p in (one, two, odds)] == [1, 1, ROLLOUTS]
+    assert [p.loop.plateau for p in (one, two, odds)] == [0, PLATEAU, PLATEAU]
+    assert own_params(make_demos(sure, {"correct": [ACROSS]}), alpha=0.2).update.alpha == 0.2
+    assert one.demonstrations.incorrect == "all"
+
+
+def test_values_by_name_are_parameters(small_demos: Demos) -> None:
+    """A value that the register does not list is taken within its range, and makes a difference."""
+    few = {"episodes": 300, "horizon": 50}
+    one, other = fit(small_demos, seed=3, **few), fit(small_demos, seed=3, alpha=0.2, **few)
+    assert other.params == Params.of(incorrect="all", alpha=0.2, **few)
+    assert not np.array_equal(one.weights, other.weights)
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "message"),
+    [
+        ({"correct": [[0]]}, {}, r"need their environment: fit\(\.\.\., task=\.\.\.\)"),
+        (None, {"params": Params(), "alpha": 0.2}, "give alpha = 0.2 or params, not both"),
+        (None, {"alhpa": 0.2}, "unknown parameter 'alhpa' .did you mean 'alpha'"),
+        (None, {"alpha": 1.5}, r"Update\.alpha = 1\.5 is not accepted .* from 0\.0 to 1\.0"),
+        (None, {"alpha": float("nan")}, r"Update\.alpha = nan is not accepted"),
+        (None, {"method": "unify"}, "unknown method"),
+    ],
+)
+def test_mistakes_of_a_call_are_one_line(
+    small_demos: Demos, given: Any, options: dict[str, Any], message: str
+) -> None:
+    """What is missing, unknown or out of range is said in one line."""
+    with pytest.raises(UserError, match=message) as caught:
+        fit(given or small_demos, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_demonstration_that_stops_too_early_is_told() -> None:
+    """If the episode goes on after a correct demonstration, a warning says how to end both alike."""
+    endless = TabularTask([[1, 0], [0, 1]], actions=("go", "stay"))
+    with pytest.warns(
+        DemoWarning, match="stops after 2 steps, but the episode goes on.*horizon = 2"
+    ):
+        fit({"correct": [["go", "stay"]]}, task=endless, seed=1, max_iterations=1)
+    result = fit({"correct": [["go", "stay"]]}, task=endless, seed=1, horizon=2)
+    assert result.converged
+
+
+def test_many_fits_are_a_table() -> None:
+    """Each seed is a row, the same as that of a single fit."""
+    table = fit_many({"correct": [ACROSS]}, seeds=[3, 1], task=lake(), progress=False)
+    assert table.columns.tolist() == [
+        *("seed", "method", "iterations", "converged", "stopped", "error")
+    ]
+    single = fit({"correct": [ACROSS]}, task=lake(), seed=1)
+    assert table["seed"].tolist() == [3, 1]
+    assert table.loc[1, "iterations"] == single.iterations
+    assert table.loc[1, "stopped"] == "threshold"
+
+
+def test_a_task_may_stand_in_for_another() -> None:
+    """Demonstrations of a maze are checked again in the task that is given."""
+    demos = Maze.from_text("S.G")
+    made = make_demos(demos, {"correct": [["right", "right"]]})
+    table = TabularTask(demos.next_state, start=0, terminal=[2], actions=demos.actions)
+    assert fit(made, task=table, seed=1).path[-1] == ((2,), "")

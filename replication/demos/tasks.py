@@ -64,9 +64,9 @@ def make_demos(
 def _demo(environment: Environment, kind: str, name: str, way: Trajectory) -> Demo:
     states: Any = None
     actions: Any = way
-    if len(way) == 2 and not isinstance(way[0], str) and isinstance(way[0], Iterable):
-        states, actions = way
     try:
+        if len(way) == 2 and not isinstance(way[0], str) and isinstance(way[0], Iterable):
+            states, actions = way
         numbers = action_numbers(environment, actions)
         states = environment.replay(numbers) if states is None else np.array(states, np.int64)
     except UserError as error:

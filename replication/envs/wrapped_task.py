@@ -204,7 +204,11 @@ class Bins:
     def __post_init__(self) -> None:
         low, high, counts = np.array(self.low), np.array(self.high), np.array(self.counts)
         fits = low.shape == high.shape == counts.shape == (counts.size,)
-        if not fits or counts.min(initial=1) < 1 or not (np.isfinite(low) & (low < high)).all():
+        if (
+            not fits
+            or counts.min(initial=1) < 1
+            or not (np.isfinite([low, high]).all() and (low < high).all())
+        ):
             raise TaskError(
                 "Bins: low, high and counts need a finite number for each part of an observation, "
                 "low below high and at least one bin"

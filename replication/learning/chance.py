@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from replication.envs.moves import Moves
 from replication.learning import arguments, compiled, qlearning
+from replication.learning.moves import Moves
 from replication.source import source_hash
 
 Floats = NDArray[np.float64]

@@ -97,6 +97,8 @@ def make_agent(environment: Environment, params: Params) -> Agent:
         )
     if learner.arithmetic != "double":
         raise ChoiceError('here all operations are rounded: set arithmetic = "double"')
+    if learner.solver == "planning" and learner.gamma == 1:
+        raise ChoiceError("planning needs a discount below 1: set gamma = 0.99")
     task = environment.task if isinstance(environment, GymTask) else environment
     if isinstance(task, TabularTask):
         return ChanceAgent(task.table, params)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,6 +102,18 @@ def test_mean_expectations_are_the_mean(ways: list[list[tuple[int, int]]], gamma
     np.testing.assert_allclose(found, due, rtol=1e-12, atol=1e-300)
     alone = mean_expectations([way(ways[0])], gamma=gamma, shape=SHAPE)
     assert alone.tobytes() == mu(ways[0], gamma).tobytes()
+
+
+@given(st.lists(PAIRS, min_size=1, max_size=5), st.randoms(use_true_random=False), GAMMAS)
+def test_equal_shares_have_equal_bits(
+    ways: list[list[tuple[int, int]]], random: Any, gamma: float
+) -> None:
+    """Neither the order of trajectories nor a common multiple of their numbers changes a bit."""
+    found = mean_expectations([way(pairs) for pairs in ways], gamma=gamma, shape=SHAPE)
+    mixed = [*ways, *ways]
+    random.shuffle(mixed)
+    again = mean_expectations([way(pairs) for pairs in mixed], gamma=gamma, shape=SHAPE)
+    assert again.tobytes() == found.tobytes()
 
 
 @given(st.lists(PAIRS, max_size=5))

@@ -338,3 +338,54 @@ def test_an_expert_matched_at_once_needs_no_iteration() -> None:
     assert (trial.steps, trial.collisions.tolist()) == (0, [])
     assert trial.collisions.dtype == np.int64
     assert len(trial.values) == len(trial.rewards) == len(trial.episodes) == 1
+
+
+def test_several_trajectories_are_averaged(small_demos: Demos) -> None:
+    """ROLLOUTS: an error is that of the mean over so many trajectories; the first one is kept."""
+    trial, agent, mu_e = recorded(small_demos, rollouts=3, max_iterations=2)
+    assert [name for name, _ in agent.calls] == ["roll"] * 3 + (["learn"] + ["roll"] * 3) * 2
+    again = make_agent(small_demos.environment, Params.of(episodes=20, horizon=30))
+    for i, error in enumerate(trial.errors):
+        calls = [call for name, call in agent.calls if name == "roll"][3 * i : 3 * i + 3]
+        rolled = [again.roll_out(c["q"], np.array(c["from"], np.uint64))[0] for c in calls]
+        each = [
+            feature_expectations(one.states, one.actions, gamma=GAMMA, shape=agent.shape)
+            for one in rolled
+        ]
+        assert error == pytest.approx(norm(mu_e - np.mean(each, axis=0)), rel=1e-12)
+        np.testing.assert_array_equal(trial.episodes[i].states, rolled[0].states)
+
+
+@pytest.mark.parametrize("window", [1, 3, 8])
+def test_a_plateau_ends_a_trial_with_its_least_error(window: int) -> None:
+    """PLATEAU: a trial ends after so many updates without a smaller d, with the nearest weights."""
+    mu_e = _mu_e() + 0.05  # no trajectory is everywhere at once
+    params = Params.of(plateau=window, max_iterations=60)
+    seed = np.random.SeedSequence(1)
+    trial = run_trial(
+        Corridor(),
+        get_method("unified"),
+        mu_e,
+        np.zeros((5, 2), bool),
+        params,
+        seed=seed,
+        keep=True,
+    )
+    least = int(trial.errors.argmin())
+    assert not trial.converged
+    assert trial.iterations == least + window
+    assert trial.snapshots is not None
+    np.testing.assert_array_equal(trial.weights, trial.snapshots.weights[least])
+    np.testing.assert_array_equal(trial.q, trial.snapshots.q[least])
+    for k in range(window, least):  # nothing ended it before
+        assert trial.errors[: k + 1].argmin() > k - window
+
+
+def test_without_a_plateau_the_last_weights_are_the_result() -> None:
+    """By default a trial ends at the cap, and its result is that of the last update."""
+    seed, params = np.random.SeedSequence(1), Params.of(max_iterations=30)
+    given = Corridor(), get_method("unified"), _mu_e() + 0.05, np.zeros((5, 2), bool), params
+    trial = run_trial(*given, seed=seed, keep=True)
+    assert (trial.iterations, trial.converged) == (30, False)
+    assert trial.snapshots is not None
+    np.testing.assert_array_equal(trial.weights, trial.snapshots.weights[-1])

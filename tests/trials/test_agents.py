@@ -54,6 +54,25 @@ def test_mazes_refuse_a_falling_epsilon(small_demos: Demos) -> None:
         make_agent(small_demos.environment, Params.of(epsilon=0.3))
 
 
+@pytest.mark.parametrize("gamma", [0.0, 0.5, 0.9])
+def test_planning_finds_what_no_policy_betters(small_demos: Demos, gamma: float) -> None:
+    """SOLVER planning: Q is the fixed point of Eq. 1's target, with nothing beyond the goal."""
+    maze = as_maze(small_demos.environment)
+    agent = make_agent(maze, Params.of(solver="planning", gamma=gamma))
+    weights = np.random.default_rng(1).normal(size=agent.shape)
+    start = stream(np.random.SeedSequence(1))
+    q, after, steps, hits = agent.learn(weights, np.ones(agent.shape), start)
+    value = np.where(maze.next_state == maze.goal, 0.0, q.max(axis=1)[maze.next_state])
+    np.testing.assert_allclose(q, weights + gamma * value, rtol=1e-13, atol=1e-13)
+    assert (after.tolist(), steps, hits) == (start.tolist(), 0, 0)
+
+
+def test_soccer_cannot_plan(soccer_demos: Demos) -> None:
+    """Where there is no table, planning is refused."""
+    with pytest.raises(ChoiceError, match='set solver = "q-learning"'):
+        make_agent(soccer_demos.environment, Params.of(**SOCCER, solver="planning"))
+
+
 # --- what reaches the learner: in mazes ------------------------------------------------------
 
 UNUSUAL: dict[str, Any] = {
