@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from replication.demos.checks import DemoError
+    from replication.demos.csv import read_csv
     from replication.demos.files import check_demos, load_demos, save_demos
     from replication.demos.maze_expert import demonstrate
+    from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
     from replication.demos.tasks import make_demos
+    from replication.demos.terminal import record
     from replication.envs.gym import MazeEnv
     from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
@@ -52,19 +55,26 @@ __all__ = [
     "demonstrate",
     "fit",
     "fit_many",
+    "from_minari",
     "load_demos",
     "make_demos",
+    "read_csv",
+    "record",
     "save_demos",
     "stored",
+    "to_minari",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to know every name
     _MODULES = {
         "demos.checks": ("DemoError",),
+        "demos.csv": ("read_csv",),
         "demos.files": ("check_demos", "load_demos", "save_demos"),
         "demos.maze_expert": ("demonstrate",),
+        "demos.minari": ("from_minari", "to_minari"),
         "demos.model": ("Demo", "Demos"),
         "demos.tasks": ("make_demos",),
+        "demos.terminal": ("record",),
         "envs.gym": ("MazeEnv",),
         "envs.gym_task": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),

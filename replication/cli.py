@@ -601,26 +601,74 @@ def make(map_file: Path, task: str, out: Path, **rules: int | None) -> None:
     MAP is a text file, one line a row: . free, # obstacle, S start, G goal. Writes one correct demo
     and incorrect ones of each kind, by the rules of the stored mazes.
     """
-    from replication.demos.files import save_demos
+    from replication.demos.files import save_demos, summary
     from replication.demos.maze_expert import Expert, demonstrate
-    from replication.envs.maze import Maze, MazeError
 
     _catch_signals()
     given: dict[str, Any] = {name: value for name, value in rules.items() if value is not None}
     params = Expert(**given)
-    # a byte that is no UTF-8 becomes a character that the map refuses, with its place
-    text = files.read_file(map_file, 1_000_000).decode("utf-8-sig", errors="replace")
-    try:
-        maze = Maze.from_text(text)
-    except MazeError as error:
-        raise UserError(f"{map_file}: {error}") from error
+    maze = _maze(map_file)
     _check_targets(out, source=map_file)
     demos = demonstrate(task, maze, params=params)
     save_demos(demos, out)
-    kinds = [demo.kind for demo in demos.incorrect]
-    counts = [f"{kinds.count(kind)} {kind}" for kind in demos.kinds]
-    click.echo(f"{task}: {', '.join([f'{len(demos.correct)} correct', *counts])}")
-    click.echo(f"demos: {_short(out)}")
+    click.echo(f"{task}: {summary(demos)}\ndemos: {_short(out)}")
+
+
+def _maze(file: Path) -> Any:
+    """Return the maze of a text file."""
+    from replication.envs.maze import Maze, MazeError
+
+    # a byte that is no UTF-8 becomes a character that the map refuses, with its place
+    text = files.read_file(file, 1_000_000).decode("utf-8-sig", errors="replace")
+    try:
+        return Maze.from_text(text)
+    except MazeError as error:
+        raise UserError(f"{file}: {error}") from error
+
+
+@demos_group.command("record", epilog="Example: replicate demos record mine.json --map map.txt")
+@click.argument("file", type=FILE)
+@click.option("--map", "map_file", type=FILE, metavar="MAP", help="A maze, as for `demos make`.")
+@click.option("--env", metavar="ID", help="A Gymnasium environment; -p sets its options.")
+@click.option("--actions", metavar="NAMES", help="Names of its actions, joined by commas.")
+@parameters_option
+def record_demos(
+    file: Path,
+    map_file: Path | None,
+    env: str | None,
+    actions: str | None,
+    parameters: dict[str, Any],
+) -> None:
+    """Demonstrate by keys in this terminal.
+
+    Each demonstration is saved in FILE when it is finished. Those that are there already are kept,
+    and their environment is taken if neither --map nor --env is given.
+    """
+    from replication.demos.files import check_demos, load_demos, summary
+    from replication.demos.schema import GymnasiumFields
+    from replication.demos.terminal import record
+
+    _catch_signals()
+    if (map_file and env) or not (map_file or env or file.exists()):
+        raise UserError("say where to record: --map MAP, --env ID, or a FILE that is there")
+    if (parameters or actions) and not env:
+        raise UserError("-p and --actions are for --env")
+    with _plain_warnings():
+        if env:
+            names = actions.split(",") if actions else None
+            fields = GymnasiumFields(kind="gymnasium", id=env, options=parameters, actions=names)
+            task: Any = fields.build()
+            world = task if actions else task.env
+        else:
+            world = _maze(map_file) if map_file else load_demos(file).environment
+        try:
+            demos = record(world, file)
+        except KeyboardInterrupt:
+            kept = f"; what was finished is in {_short(file)}" if file.exists() else ""
+            _end(f"interrupted{kept}", 130)
+    click.echo(f"{demos.task}: {summary(demos)}\ndemos: {_short(file)}")
+    for doubt in check_demos(file):
+        _say(f"warning: {doubt}")
 
 
 @demos_group.command(epilog="Example: replicate demos check mine.json")

@@ -6,6 +6,7 @@ import fcntl
 import os
 import pty
 import re
+import select
 import struct
 import subprocess
 import sys
@@ -56,3 +57,77 @@ def screen(told: str, columns: int) -> list[str]:
             at += 1
         rows += [[] for _ in range(row + 1 - len(rows))]
     return ["".join(line) for line in rows]
+
+
+CONTROLLED = (
+    "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+)
+"""Makes standard input the terminal whose Ctrl-C interrupts, then runs Python."""
+
+PATIENCE = 300.0
+"""Seconds after which a screen that does not come is a failure."""
+
+
+class Typist:
+    """Someone at a terminal in which Python runs: presses keys and looks at the screen."""
+
+    def __init__(
+        self, *words: str, cwd: Path, columns: int = 80, lines: int = 24, **environment: str
+    ) -> None:
+        self._ours, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+        self.before = termios.tcgetattr(theirs)
+        given: dict[str, Any] = {"stdin": theirs, "stdout": theirs, "stderr": theirs}
+        hidden = ("COLUMNS", "LINES", "NO_COLOR")
+        env = {name: value for name, value in os.environ.items() if name not in hidden}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", CONTROLLED, *words],
+            cwd=cwd,
+            env=env | {"TERM": "xterm"} | environment,
+            start_new_session=True,
+            **given,
+        )
+        self._theirs = theirs  # kept open, so that its settings can be looked at in the end
+        self._told = b""
+
+    @property
+    def told(self) -> str:
+        """All that was written to the terminal."""
+        return self._told.decode(errors="replace").replace("\r\n", "\n")
+
+    @property
+    def screen(self) -> str:
+        """What the terminal shows, without colours."""
+        return re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", self.told.split("\x1b[H")[-1])
+
+    @property
+    def settings(self) -> list[Any]:
+        """How the terminal is set."""
+        return termios.tcgetattr(self._theirs)
+
+    def see(self, text: str) -> str:
+        """Wait until the screen shows a text; return the screen."""
+        while text not in self.screen:
+            assert select.select([self._ours], [], [], PATIENCE)[0], self.screen
+            self._told += os.read(self._ours, 65536)
+        return self.screen
+
+    def press(self, keys: str | bytes, text: str) -> str:
+        """Press keys, and wait until the screen shows a text."""
+        os.write(self._ours, keys.encode() if isinstance(keys, str) else keys)
+        return self.see(text)
+
+    def close(self) -> None:
+        """Close the terminal."""
+        os.close(self._theirs)
+        os.close(self._ours)
+
+    def end(self) -> int:
+        """Wait for the end of the process; return its exit code."""
+        while self.process.poll() is None:
+            if select.select([self._ours], [], [], 0.1)[0]:
+                self._told += os.read(self._ours, 65536)
+        while select.select([self._ours], [], [], 0)[0]:
+            self._told += os.read(self._ours, 65536)
+        return self.process.returncode

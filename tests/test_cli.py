@@ -36,7 +36,7 @@ from tests.terminal import in_terminal
 COMMANDS = [
     *(["run"], ["draw"], ["status"], ["verify"], ["copy"], ["clean"], ["site"], ["learn"]),
     ["choices"],
-    *(["demos", name] for name in ("make", "check", "schema")),
+    *(["demos", name] for name in ("make", "record", "check", "schema")),
 ]
 
 
@@ -587,6 +587,24 @@ def test_make_refuses_in_one_line(tmp_path: Path) -> None:
     )
     drawn.write_bytes(b"S.\xffG")
     assert "map.txt: unknown character" in refused("demos", "make", drawn, *rest)
+    assert not out.exists()
+
+
+def test_record_refuses_in_one_line(tmp_path: Path) -> None:
+    """Without a place to record in, or a terminal, one line says what to do; nothing is written."""
+    drawn, out = tmp_path / "map.txt", tmp_path / "mine.json"
+    record = ("demos", "record", out)
+    drawn.write_text("S.G")
+    assert "needs a terminal; elsewhere" in refused(*record, "--map", drawn)
+    assert "say where to record: --map MAP, --env ID" in refused(*record)
+    assert "say where to record" in refused(*record, "--map", drawn, "--env", "FrozenLake-v1")
+    assert "-p and --actions are for --env" in refused(*record, "--map", drawn, "-p", "a", "1")
+    lake = (*record, "--env", "FrozenLake-v1")
+    assert "unexpected keyword argument 'slippery'" in refused(*lake, "-p", "slippery", "true")
+    assert "names 2 actions; the environment has 4" in refused(*lake, "--actions", "left,right")
+    assert "Frozen" in refused(*record, "--env", "FrozenLak-v1")
+    assert "have no numbers" in refused(*record, "--env", "CartPole-v1")
+    assert "none.txt: cannot be read" in refused(*record, "--map", tmp_path / "none.txt")
     assert not out.exists()
 
 

@@ -121,6 +121,15 @@ def save_demos(demos: Demos, path: str | os.PathLike[str]) -> None:
             raise DemoError(f"cannot be written ({reason(error)})") from None
 
 
+def summary(demos: Demos | None) -> str:
+    """Return how many demonstrations there are of each kind."""
+    if demos is None:
+        return "nothing yet"
+    kinds = [demo.kind for demo in demos.incorrect]
+    counts = [f"{kinds.count(kind)} {kind}" for kind in demos.kinds]
+    return ", ".join([f"{len(demos.correct)} correct", *counts])
+
+
 def _demo(environment: Environment, kind: str, fields: CorrectFields | IncorrectFields) -> Demo:
     actions = action_numbers(environment, fields.name, fields.actions)
     states = replay(environment, fields.name, actions, fields.states)
