@@ -519,6 +519,21 @@ def site(out: Path) -> None:
     click.echo(f"open {first.resolve().as_uri()} in a browser")
 
 
+@app.command(epilog="Example: replicate export")
+@folder("Where the export goes.", Path("build/export"))
+def export(out: Path) -> None:
+    """Export published results for other programs.
+
+    Writes an RO-Crate of the runs and the verdicts with the files that it describes, and in it
+    codemeta.json and croissant.json. Nothing is executed.
+    """
+    from replication.export.write import write_export
+
+    _catch_signals()
+    files.check_writable(out.absolute().parent)  # where the new folder stands beside the old one
+    click.echo(f"export: {_short(write_export(_all_notebooks(), out, echo=click.echo))}")
+
+
 # --- demonstrations --------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ MODULES = {
 GROUND = ("errors", "files", "source", "progress")
 FLOORS = (
     *("paper", "envs", "demos", "learning", "irl", "trials", "evidence", "report", "site"),
-    *("fitting", "cli", "__main__"),
+    *("export", "fitting", "cli", "__main__"),
 )
 """The order of the argument: a part imports from those before it, and from the ground floor."""
 
@@ -26,6 +26,7 @@ MAY_IMPORT = {
     "irl": ("errors", "paper", "learning", "irl"),
     "pipeline": (*GROUND, "pipeline"),
     "site": (*GROUND, "pipeline", *FLOORS[:9]),
+    "export": (*GROUND, "pipeline", "evidence", "export"),
     "cli": (*GROUND, "pipeline", *FLOORS),
 }
 

@@ -34,8 +34,8 @@ from tests.notebooks import write_notebook
 from tests.terminal import in_terminal
 
 COMMANDS = [
-    *(["run"], ["draw"], ["status"], ["verify"], ["copy"], ["clean"], ["site"], ["learn"]),
-    ["choices"],
+    *(["run"], ["draw"], ["status"], ["verify"], ["copy"], ["clean"], ["site"], ["export"]),
+    *(["learn"], ["choices"]),
     *(["demos", name] for name in ("make", "record", "check", "schema")),
 ]
 

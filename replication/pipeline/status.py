@@ -18,7 +18,7 @@ from replication.pipeline.manifest import (
     read_manifest,
     read_runs,
 )
-from replication.pipeline.notebook import refuse
+from replication.pipeline.notebook import NotebookError, refuse
 from replication.pipeline.plan import Run
 
 
@@ -54,6 +54,21 @@ def status_lines(
     if left:
         lines.append(f"to remove what is left of {', '.join(left)}: {_command('clean', *options)}")
     return lines
+
+
+def check_fresh(runs: Sequence[Run]) -> None:
+    """Refuse to go on from results that are not up to date.
+
+    Raises
+    ------
+    NotebookError
+        Naming the first notebook that is missing or stale, with the reason and what to do.
+    """
+    for run in runs:
+        state = run.state
+        if state.kind != FRESH:
+            why = f": {state.why[0]}" if state.why else ""
+            raise NotebookError(f"{run.name} is {state.kind}{why}; first: replicate run {run.name}")
 
 
 def _output_lines(run: Run, state: State) -> list[str]:

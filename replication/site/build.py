@@ -19,9 +19,9 @@ from replication.evidence.tables import read_table
 from replication.files import read_file, read_text, write_file
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
-from replication.pipeline.manifest import FRESH
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import render_text
+from replication.pipeline.status import check_fresh
 from replication.report.findings import held
 from replication.site import extension, overview
 from replication.site.choices import choices
@@ -43,7 +43,7 @@ UNUSED = (".*", "*.map", "locales", "logo_*", "fontawesome.js", "fa-brands-*", "
 
 
 class SiteError(UserError):
-    """Something that the site is built from is missing or stale; the message is one line."""
+    """A folder or a page that cannot be written; the message is one line."""
 
 
 def build_site(
@@ -70,7 +70,7 @@ def build_site(
 
     Raises
     ------
-    SiteError
+    UserError
         If a notebook is stale or failed, Sphinx refuses a page, or the folder holds something else.
     """
     if site.exists() and any(site.iterdir()) and not (site / INDEX).exists():
@@ -89,11 +89,8 @@ def build_site(
 def _fresh_runs(notebooks: Sequence[Path], out: Path) -> list[Run]:
     """Return the runs behind published notebooks, their text up to date; refuse stale ones."""
     runs = prepare(notebooks, profile="paper", out=out)
+    check_fresh(runs)
     for run in runs:
-        state = run.state
-        if state.kind != FRESH:
-            why = f": {state.why[0]}" if state.why else ""
-            raise SiteError(f"{run.name} is {state.kind}{why}; first: replicate run {run.name}")
         render_text(run)
     return runs
 

@@ -11,6 +11,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from replication.files import PROJECT, write_file
 from replication.pipeline import execute
+from replication.pipeline.notebook import NotebookError
 from replication.pipeline.run import run_notebooks
 from replication.site import build
 from replication.site.build import SiteError, build_site
@@ -114,10 +115,10 @@ def test_a_stale_or_missing_notebook_stops_the_build(project: Path) -> None:
     before = (built(project) / "index.html").read_bytes()
     write(project, code="x = 2")
     why = "the notebook's code has changed"
-    with pytest.raises(SiteError, match=f"toy is stale: {why}; first: replicate run toy"):
+    with pytest.raises(NotebookError, match=f"toy is stale: {why}; first: replicate run toy"):
         built(project)
     shutil.rmtree(project / "figures")
-    with pytest.raises(SiteError, match="toy is missing; first: replicate run toy"):
+    with pytest.raises(NotebookError, match="toy is missing; first: replicate run toy"):
         built(project)
     assert (project / "site" / "index.html").read_bytes() == before
 
