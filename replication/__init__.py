@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
     from replication.demos.tasks import make_demos
-    from replication.demos.terminal import record
     from replication.envs.gym import MazeEnv
     from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from replication.irl import METHODS
     from replication.learned_reward import LearnedReward
     from replication.paper.params import Params
+    from replication.recording.terminal import record
     from replication.result import Fit
 
 __version__ = "0.1.0"
@@ -74,7 +74,7 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.minari": ("from_minari", "to_minari"),
         "demos.model": ("Demo", "Demos"),
         "demos.tasks": ("make_demos",),
-        "demos.terminal": ("record",),
+        "recording.terminal": ("record",),
         "envs.gym": ("MazeEnv",),
         "envs.gym_task": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),

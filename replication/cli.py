@@ -659,9 +659,9 @@ def record_demos(
     Each demonstration is saved in FILE when it is finished. Those that are there already are kept,
     and their environment is taken if neither --map nor --env is given.
     """
+    from replication.demos.environments import GymnasiumFields
     from replication.demos.files import check_demos, load_demos, summary
-    from replication.demos.schema import GymnasiumFields
-    from replication.demos.terminal import record
+    from replication.recording.terminal import record
 
     _catch_signals()
     if (map_file and env) or not (map_file or env or file.exists()):

@@ -1,4 +1,4 @@
-"""What was learned: reward, policy, path and errors, and what to do with them."""
+"""What was learned, and what to do with it."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ class Fit:
         """Return the name of the action that the policy takes.
 
         `state` is a state's number, its numbers in files (such as row and column), or an
-        observation that the task can number. Raises `FitError` if there is none such.
+        observation. Raises `FitError` if there is none such.
         """
         return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
 

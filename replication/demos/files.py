@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from replication.demos.checks import DemoError, DemoWarning, action_numbers, replay
+from replication.demos.environments import OWN
 from replication.demos.model import Demo, Demos, state_action_pairs
 from replication.demos.schema import (
     FORMAT,
-    OWN,
     VERSION,
     CorrectFields,
     IncorrectFields,

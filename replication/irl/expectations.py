@@ -71,10 +71,9 @@ def mean_expectations(
 ) -> NDArray[np.float64]:
     """Return the mean feature expectations [state, action] of some trajectories.
 
-    That is mu_E of the correct demonstrations (Eq. 5), and mu_i of the agent's trajectories (Eq. 7,
-    choice ROLLOUTS). Equal trajectories are weighted, not added up, and all are taken in an order
-    of their own: so equal shares have equal bits, in whatever number and order the trajectories
-    come. Rounding alone would otherwise keep d from reaching zero.
+    That is mu_E of the demonstrations (Eq. 5), and mu_i of the agent's trajectories (Eq. 7). Equal
+    ones are weighted, and all are taken in an order of their own: so equal shares have equal bits.
+    Rounding alone would otherwise keep d from reaching zero.
     """
     counts: dict[tuple[bytes, bytes], int] = {}
     each: dict[tuple[bytes, bytes], NDArray[np.float64]] = {}

@@ -36,16 +36,13 @@ class Trial:
     errors
         d_0 ... d_n (Eq. 6), one for each trajectory of the agent; n is the number of iterations.
     converged
-        Whether the last error is within the threshold; otherwise the trial ended at the cap or, if
-        it is asked for, on a plateau (choice PLATEAU).
+        Whether the last error is within the threshold; else a cap or a plateau ended the trial.
     steps
         Learning steps in the environment, over all iterations.
     weights, q
-        The last reward weights and Q-table, `[state, action]`; if a plateau may end the trial,
-        those of its least error.
+        The last reward weights and Q-table, `[state, action]`; with PLATEAU those of least error.
     episodes
-        The agent's trajectory before each update and after the last one; as many as errors. Of
-        several (choice ROLLOUTS) the first.
+        The agent's (first) trajectory before each update and after the last; as many as errors.
     collisions
         Steps that ran into a wall or an obstacle while learning after each update,
         int64 [iteration].

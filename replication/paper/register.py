@@ -42,43 +42,27 @@ class Choice:
     def accepted(self) -> str:
         """The accepted values, in words, for messages and tables."""
         if self.range is not None:
-            low, high = self.range
             kind = "a whole number" if isinstance(self.default, int) else "a number"
-            return f"{kind} from {low} to {high}"
+            return f"{kind} from {self.range[0]} to {self.range[1]}"
         return ", ".join(repr(value) for value in (self.default, *self.alternatives))
 
     @property
     def others(self) -> str:
-        """What is compared with the paper besides the default, in words; "" if nothing is."""
+        """What is compared with the paper besides the default, in words."""
         if self.alternatives or self.range is None:
             return ", ".join(map(str, self.alternatives))
         return f"{self.range[0]:g} to {self.range[1]:g}"
 
     def registered(self, value: Any) -> Value:
-        """Return `value` as `check` does, if it is among those that are compared with the paper.
-
-        Raises
-        ------
-        ChoiceError
-            If it is not.
-        """
+        """Return `value` as `check` does; raises `ChoiceError` if it is not listed."""
         checked = self.check(value)
-        values = (self.default, *self.alternatives)
-        if self.alternatives and checked not in values:
-            raise ChoiceError(
-                f"{self.field} = {value!r} is not registered (choice {self.id}): use "
-                f"{', '.join(map(repr, values))}"
-            )
+        if self.alternatives and checked not in (self.default, *self.alternatives):
+            others = f"use {self.default} or {self.others}"
+            raise ChoiceError(f"{self.field} = {value!r} is not registered ({self.id}): {others}")
         return checked
 
     def check(self, value: Any) -> Value:
-        """Return `value` in the type of the default.
-
-        Raises
-        ------
-        ChoiceError
-            If it is outside the range, or not one of the registered words.
-        """
+        """Return `value` in the type of the default; raises `ChoiceError` if it is not accepted."""
         kind = type(self.default)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         fits = isinstance(value, str) if kind is str else number

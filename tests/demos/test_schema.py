@@ -13,7 +13,8 @@ import pytest
 
 from replication.demos import schema
 from replication.demos.checks import DemoError
-from replication.demos.schema import MazeFields, json_schema, read_fields
+from replication.demos.environments import MazeFields
+from replication.demos.schema import json_schema, read_fields
 from replication.files import PROJECT
 from tests.demos.example import DATA, EXAMPLE, MAZE, STORED, Changes, edited
 

@@ -60,7 +60,7 @@ def test_what_is_registered_is_told_from_what_is_accepted() -> None:
     """The default and the alternatives are registered; without alternatives, the whole range is."""
     assert [STEP.registered(value) for value in (4, 1, 2.0)] == [4, 1, 2]
     assert (WHOLE.registered(7), WORD.registered("kept"), STEP.check(3)) == (7, "kept", 3)
-    message = r"^Some\.step = 3 is not registered \(choice STEP\): use 4, 1, 2$"
+    message = r"^Some\.step = 3 is not registered \(STEP\): use 4 or 1, 2$"
     with pytest.raises(ChoiceError, match=message):
         STEP.registered(3)
     assert (WHOLE.others, WORD.others, STEP.others) == ("1 to 9", "kept, reset", "1, 2")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from replication import Bins, Demos, GymTask, Maze, TabularTask, WrappedTask
-from replication.demos.worlds import as_world
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import FORWARD
 from replication.errors import UserError
+from replication.recording.worlds import as_world
 
 MAZE = Maze.from_text("""
     ....G

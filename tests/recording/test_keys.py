@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from replication.demos.keys import PLAIN_KEYS, action_keys, legend, split_keys
 from replication.errors import UserError
+from replication.recording.keys import PLAIN_KEYS, action_keys, legend, split_keys
 
 
 @given(st.text(max_size=30))

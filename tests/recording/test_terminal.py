@@ -9,8 +9,8 @@ import gymnasium
 import pytest
 
 from replication import Maze, demonstrate, load_demos, record, save_demos
-from replication.demos import terminal
 from replication.errors import UserError
+from replication.recording import terminal
 from tests.terminal import Typist
 
 MAP = "....G\n.##..\nS....\n"

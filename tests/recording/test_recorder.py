@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from replication import Demos, Maze
-from replication.demos.recorder import Recorder
-from replication.demos.worlds import as_world
 from replication.errors import UserError
-from tests.demos.test_worlds import MAZE, Drifting
+from replication.recording.recorder import Recorder
+from replication.recording.worlds import as_world
+from tests.recording.test_worlds import MAZE, Drifting
 
 CORRECT = ["right"] * 4 + ["up"] * 2 + ["enter", "enter"]
 HIT = ["down", "right", "enter", *"hit", "enter"]

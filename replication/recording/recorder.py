@@ -9,11 +9,11 @@ from itertools import count
 import numpy as np
 
 from replication.demos.files import summary
-from replication.demos.keys import action_keys, legend
 from replication.demos.model import Demo, Demos
-from replication.demos.question import Question, wrap
-from replication.demos.worlds import World
 from replication.errors import UserError, compact
+from replication.recording.keys import action_keys, legend
+from replication.recording.question import Question, wrap
+from replication.recording.worlds import World
 
 FRAME = 0.25
 """Seconds that a replay shows a step."""

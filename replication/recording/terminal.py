@@ -19,13 +19,13 @@ from typing import Any
 import gymnasium
 
 from replication.demos.files import load_demos, save_demos
-from replication.demos.keys import split_keys
 from replication.demos.model import Demos
-from replication.demos.recorder import Recorder
-from replication.demos.worlds import as_world
 from replication.envs.environment import Environment
 from replication.errors import UserError
 from replication.files import check_writable
+from replication.recording.keys import split_keys
+from replication.recording.recorder import Recorder
+from replication.recording.worlds import as_world
 
 POLL = 0.25
 """Seconds between two looks at the terminal's size."""

@@ -25,7 +25,7 @@ class Question:
         return self._typed.strip() or (self._offered[self._chosen] if self._offered else "")
 
     def press(self, key: str) -> None:
-        """Take a key, see :meth:`replication.demos.recorder.Recorder.press`."""
+        """Take a key, see :meth:`replication.recording.recorder.Recorder.press`."""
         if key in ("up", "down") and self._offered:
             self._typed = ""
             self._chosen = (self._chosen + (1 if key == "down" else -1)) % len(self._offered)

@@ -6,8 +6,8 @@ import re
 import string
 from collections.abc import Sequence
 
-from replication.demos.question import wrap
 from replication.errors import UserError, clip
+from replication.recording.question import wrap
 
 ARROWS = {
     "up": ("up", "north", "forward"),

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from replication.demos.question import Question
+from replication.recording.question import Question
 
 
 def asked(offered: list[str], *keys: str) -> Question:

@@ -1,0 +1,1 @@
+"""Recording demonstrations in a terminal: keys, screens and the worlds behind them."""
