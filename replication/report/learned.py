@@ -94,7 +94,7 @@ def _task_figure(
 
 
 def _draw_errors(panel: Axes, errors: NDArray[np.float64], letter: str) -> None:
-    panel.plot(errors, color=COLOUR, marker="o", ms=2)
+    panel.plot(errors, color=COLOUR, marker="o", ms=2, clip_on=False)
     panel.set(title=f"({letter}) error", xlabel="iteration", ylabel="error d", ylim=(0, None))
     panel.set_xlim(0, max(1, len(errors) - 1))
     panel.xaxis.set_major_locator(MaxNLocator(5, integer=True))
