@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
     from replication.demos.tasks import make_demos
+    from replication.envs.bins import Bins
     from replication.envs.gym import MazeEnv
     from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
     from replication.envs.tabular import TabularTask
-    from replication.envs.task import TaskError
-    from replication.envs.wrapped_task import Bins, WrappedTask
+    from replication.envs.task import Task, TaskError
+    from replication.envs.wrapped_task import WrappedTask
     from replication.files import stored
     from replication.fitting import fit, fit_many
     from replication.irl import METHODS
@@ -49,6 +50,7 @@ __all__ = [
     "MazeError",
     "Params",
     "TabularTask",
+    "Task",
     "TaskError",
     "WrappedTask",
     "check_demos",
@@ -75,12 +77,13 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.model": ("Demo", "Demos"),
         "demos.tasks": ("make_demos",),
         "recording.terminal": ("record",),
+        "envs.bins": ("Bins",),
         "envs.gym": ("MazeEnv",),
         "envs.gym_task": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),
         "envs.tabular": ("TabularTask",),
-        "envs.task": ("TaskError",),
-        "envs.wrapped_task": ("Bins", "WrappedTask"),
+        "envs.task": ("Task", "TaskError"),
+        "envs.wrapped_task": ("WrappedTask",),
         "files": ("stored",),
         "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),

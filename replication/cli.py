@@ -519,7 +519,7 @@ def site(out: Path) -> None:
     click.echo(f"open {first.resolve().as_uri()} in a browser")
 
 
-@app.command(epilog="Example: replicate export")
+@app.command(cls=InClone, epilog="Example: replicate export")
 @folder("Where the export goes.", Path("build/export"))
 def export(out: Path) -> None:
     """Export published results for other programs.
@@ -527,6 +527,7 @@ def export(out: Path) -> None:
     Writes an RO-Crate of the runs and the verdicts with the files that it describes, and in it
     codemeta.json and croissant.json. Nothing is executed.
     """
+    need("site")
     from replication.export.write import write_export
 
     _catch_signals()
@@ -587,14 +588,15 @@ def learn(
     saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
     _check_targets(saved, picture, source=file)
     _say(f"{demos.task}, {method}: learning")
-    with iteration_meter() as report:
+    with _plain_warnings(), iteration_meter() as report:
         result = fit(demos, method=method, params=params, seed=seed, report=report)
     result.save(saved)
     save_figure(result.plot(), stem, formats=("png",))
     ended = "converged" if result.converged else "NOT converged"
+    why = f" (no smaller d in {params.loop.plateau})" if result.stopped == "plateau" else ""
     _say(
-        f"{demos.task}, {method}: {ended} after {result.iterations} iterations, "
-        f"d = {result.errors[-1]:.4g}"
+        f"{demos.task}, {method}: {ended} after {result.iterations} iterations{why}, "
+        f"d = {result.error:.4g}"
     )
     _say(f"result:  {_short(saved)}\npicture: {_short(picture)}")
     sys.exit(int(strict and not result.converged))
@@ -739,8 +741,8 @@ def _plain_warnings() -> Iterator[None]:
 def choices(id: str | None) -> None:
     """List what the paper leaves open.
 
-    Each choice has our default and, in brackets, what else is accepted. With an ID, show that
-    choice in full.
+    Each choice has our default and, in brackets, the other values that are listed. With an ID,
+    show that choice in full; a task of your own may have any number that is accepted.
     """
     from replication.paper.groups import choice_groups
     from replication.paper.register import load_choices
@@ -751,17 +753,20 @@ def choices(id: str | None) -> None:
         for group, members in choice_groups().items():
             click.echo(f"{group[0].upper()}{group[1:]}")
             for entry in members:
-                others = f"{'or ' * bool(entry.alternatives)}{entry.others}"
-                value = f"{entry.default} ({others})" if entry.others else str(entry.default)
+                value = (
+                    f"{entry.default} (or {entry.others})" if entry.others else f"{entry.default}"
+                )
                 _print_item(f"  {entry.id}", value, column)
         click.echo("\nreplicate choices ID shows one of them in full")
         return
     if id.upper() not in entries:
         raise UserError(unknown(id.upper(), entries, "choice"))
     entry = entries[id.upper()]
-    fields = ("id", "place", "open", "default", "rule", "alternatives", "field", "data", "code")
-    for key in fields:
+    names = "id place open default rule alternatives accepted field data code"
+    for key in names.split():
         value = entry.others if key == "alternatives" else str(getattr(entry, key))
+        if key == "accepted" and entry.range is None:
+            continue
         if value:
             _print_item(f"{key}:", value, 14)
 

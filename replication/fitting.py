@@ -17,7 +17,7 @@ from replication.demos.model import Demos
 from replication.demos.tasks import Trajectory, make_demos
 from replication.envs.environment import Environment
 from replication.envs.task import Task
-from replication.errors import show
+from replication.errors import clip, show
 from replication.irl import Method
 from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
@@ -73,7 +73,8 @@ def fit(
         Correct and incorrect demonstrations, from :func:`replication.load_demos`; or lists of them
         by kind, see :func:`replication.make_demos`, in the `task`.
     task
-        The environment of such lists: a task of your own, or a maze.
+        The environment of such lists, a task of your own or a maze; or one in whose place `demos`
+        are checked again.
     method
         A name in :data:`replication.METHODS`.
     params
@@ -96,7 +97,8 @@ def fit(
     Warns
     -----
     DemoWarning
-        If no policy can match the correct demonstrations exactly.
+        If no policy can match such lists exactly (`load_demos` has warned of those in a file), or
+        an episode goes on where a correct demonstration stops.
 
     Examples
     --------
@@ -113,6 +115,8 @@ def fit(
     (True, True)
     """
     checked = _checked(demos, task)
+    if not isinstance(seed, int) or seed < 0:
+        raise FitError(f"seed = {clip(repr(seed))} must be a whole number, at least 0")
     if params is not None and values:
         raise FitError(f"give {min(values)} = {show(values[min(values)])} or params, not both")
     chosen = params if params is not None else own_params(checked, **values)
@@ -165,6 +169,8 @@ def fit_many(
 
     checked = _checked(demos, options.pop("task", None))
     rows = []
+    if not isinstance(seeds, Iterable):
+        raise FitError(f"seeds = {clip(repr(seeds))} must be several: range({clip(repr(seeds))})")
     for seed in tqdm(list(seeds), desc=checked.task, unit="fit", disable=not progress):
         result = fit(checked, seed=seed, **options)
         names = ("seed", "method", "iterations", "converged", "stopped", "error")
@@ -191,6 +197,8 @@ def own_params(demos: Demos, **values: Any) -> Params:
 
 def _checked(demos: Demos | Mapping[str, Iterable[Trajectory]], task: Environment | None) -> Demos:
     """Return demonstrations of the task, with a warning where they cannot be matched."""
+    if task is not None and not hasattr(task, "goal_step"):
+        raise FitError(f"task = {clip(repr(task))} is no task; wrap it: GymTask(env)")
     if isinstance(demos, Demos):
         return demos if task is None else replace(demos, environment=task)
     if task is None:

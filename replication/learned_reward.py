@@ -40,7 +40,7 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
         super().__init__(env)
         self.result = result
         self._observation: Any = None
-        self._first = getattr(env.action_space, "start", 0)
+        self._first = int(getattr(env.action_space, "start", 0))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -50,7 +50,7 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._observation, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take an action; raises `FitError` if the state is not one of the task."""
-        reward = self.result.reward(self._observation, int(action - self._first))
+        """Take an action; raises `UserError` if the state is not one of the task."""
+        reward = self.result.reward(self._observation, int(action) - self._first)
         self._observation, _, ended, cut, info = self.env.step(action)
         return self._observation, reward, ended, cut, info

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Integral
 from pathlib import Path
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replication.demos.checks import DemoError
 from replication.demos.files import demos_document, doubts, parse_demos
 from replication.demos.model import Demos
 from replication.demos.tasks import action_numbers
 from replication.envs.environment import Environment
 from replication.envs.task import Task
-from replication.envs.wrapped_task import WrappedTask
 from replication.errors import UserError, clip, show
 from replication.files import FileError, read_json, write_file
 from replication.paper.params import Params
@@ -31,10 +31,10 @@ VERSION = 1
 
 
 class FitError(UserError):
-    """A file that holds no fit, or a state that a fit does not know; the message is one line."""
+    """A file that holds no fit, or a state that it does not know, in one line."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Fit:
     """What was learned from demonstrations, and all that is needed to learn it again.
 
@@ -92,7 +92,7 @@ class Fit:
 
     @property
     def error(self) -> float:
-        """The error d of the weights: the last one or, where a plateau may end it, the least."""
+        """The error d of the weights: the last or, with a plateau, the least one."""
         return float(self.errors[taken(self.errors, self.params)])
 
     @property
@@ -104,7 +104,7 @@ class Fit:
         return list(zip(cells, names, strict=True))
 
     def summary(self) -> str:
-        """Return what was learned, from what, and why it stopped, in a few lines."""
+        """Return what was learned and why it stopped, in a few lines."""
         demos, loop = self.demos, self.params.loop
         why = {
             "threshold": f"converged: d is within the threshold {loop.threshold:g}",
@@ -123,7 +123,7 @@ class Fit:
         if not self.converged and loop.plateau:
             nearest = int(self.errors.argmin())
             lines.append(f"            reward and policy are those of iteration {nearest}")
-        lines += [f"note        {doubt}" for doubt in (*doubts(demos), *open_ends(self))]
+        lines += [f"note        {doubt}" for doubt in doubts(demos)]
         path = [",".join(map(str, cell)) for cell, _ in self.path]
         shown = path if len(path) <= 12 else [*path[:8], "...", *path[-3:]]
         return "\n".join([*lines, f"path        {' '.join(shown)} ({len(self.actions)} steps)"])
@@ -135,8 +135,8 @@ class Fit:
     def predict(self, state: Any) -> str:
         """Return the name of the action that the policy takes.
 
-        `state` is a state's number, its numbers in files (such as row and column), or an
-        observation. Raises `FitError` if there is none such.
+        `state` is what the environment shows: an observation of Gymnasium; else the number of a
+        state or, in a maze, row and column. Raises `UserError` if there is none such.
         """
         return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
 
@@ -155,20 +155,18 @@ class Fit:
     def _number(self) -> str:
         return f"{self.iterations} iteration{'s' * (self.iterations != 1)}"
 
-    def _state(self, state: Any) -> int:
+    def _state(self, seen: Any) -> int:
         """Return the number of a state."""
         environment = self.demos.environment
-        if isinstance(environment, WrappedTask) and not isinstance(state, Integral):
-            return environment.number(state)
-        if isinstance(state, Sequence):
-            cells = environment.cells(np.arange(environment.n_states))
-            found = np.flatnonzero((cells == np.array(state)).all(axis=1))
-            if found.size:
-                return int(found[0])
-        if isinstance(state, Integral) and 0 <= int(state) < environment.n_states:
-            return int(state)
+        if isinstance(environment, Task):
+            return environment.number(seen)
+        if isinstance(seen, Integral) and 0 <= int(seen) < environment.n_states:
+            return int(seen)
+        for state in range(environment.n_states):
+            if isinstance(seen, Iterable) and environment.cell(state) == tuple(seen):
+                return state
         last = environment.n_states - 1
-        raise FitError(f"there is no state {clip(repr(state))}; states are 0..{last}")
+        raise FitError(f"there is no state {clip(repr(seen))}; states are 0..{last}")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the fit as one JSON file; numbers keep every bit."""
@@ -212,6 +210,9 @@ class Fit:
             )
         except FileError as error:
             raise FitError(str(error)) from None
+        except DemoError as error:
+            how = str(error).replace("load_demos", "Fit.load")
+            raise FitError(f"{path}: demos: {how}") from None
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise FitError(f"{path}: cannot be read as a fit ({error!r}); save it again") from None
 

@@ -19,7 +19,7 @@ from replication.demos.model import Demo, Demos
 from replication.demos.schema import FORMAT, VERSION, read_fields
 from replication.envs.environment import Environment
 from replication.envs.task import Task
-from replication.errors import UserError, show
+from replication.errors import UserError, need, show
 from replication.files import parse_json
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
         "action_space": gymnasium.spaces.Discrete(environment.n_actions),
     }
     words = demos.description or f"Demonstrations of {demos.task}; rewards are 0."
+    dataset = None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that neither author nor code is named
@@ -88,8 +89,12 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
             {"success": demo.kind == "correct", "kind": demo.kind, "name": demo.name}
             for demo in all_demos
         )
-    except (ValueError, OSError, ImportError) as error:
-        raise UserError(f"dataset {show(dataset_id)}: {_line(error)}") from None
+    except BaseException as error:
+        if dataset is not None:  # half a dataset would be read without the kinds of mistakes
+            minari.delete_dataset(dataset_id)
+        if isinstance(error, ValueError | OSError | ImportError):
+            raise UserError(f"dataset {show(dataset_id)}: {_line(error)}") from None
+        raise
     return dataset
 
 
@@ -180,13 +185,9 @@ def _environment(about: dict[str, Any]) -> Environment:
 
 
 def _minari() -> Any:
-    try:
-        import minari
-    except ImportError:
-        raise UserError(
-            "Minari is not installed; the extra 'minari' has it: "
-            "pip install 'unified-irl-replication[minari]'"
-        ) from None
+    need("minari")
+    import minari
+
     return minari
 
 

@@ -11,7 +11,7 @@ from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
 from replication.envs.task import TaskError
-from replication.errors import UserError, show
+from replication.errors import UserError, clip, show
 
 Trajectory = Sequence[str | int] | tuple[Sequence[int], Sequence[str | int]]
 """Actions by name or number; or the states [T + 1], by number, and the actions [T]."""
@@ -49,6 +49,8 @@ def make_demos(
     >>> demos.correct[0].states.tolist(), demos.kinds
     ([0, 1, 2], ('dawdle',))
     """
+    if not isinstance(trajectories, Mapping):
+        raise DemoError('give demonstrations by kind: {"correct": [...], "mistake": [...]}')
     made = {
         kind: tuple(
             _demo(environment, kind, f"{kind}-{number}", way)
@@ -68,7 +70,7 @@ def _demo(environment: Environment, kind: str, name: str, way: Trajectory) -> De
         if len(way) == 2 and not isinstance(way[0], str) and isinstance(way[0], Iterable):
             states, actions = way
         numbers = action_numbers(environment, actions)
-        states = environment.replay(numbers) if states is None else np.array(states, np.int64)
+        states = environment.replay(numbers) if states is None else _whole(states)
     except UserError as error:
         raise DemoError(f"demo {show(name)}: {error}") from None
     except (TypeError, ValueError) as error:
@@ -87,12 +89,23 @@ def action_numbers(environment: Environment, actions: Iterable[str | int]) -> An
     TaskError
         If there is no such action.
     """
-    known = {str(number): number for number in range(environment.n_actions)}
+    known: dict[str | int, int] = {number: number for number in range(environment.n_actions)}
     known |= {name: number for number, name in enumerate(environment.actions)}
     found = []
     for step, action in enumerate(actions, start=1):
-        if str(action) not in known:
+        if isinstance(action, bool) or action not in known:
             names = ", ".join(environment.actions)
-            raise TaskError(f"step {step}: there is no action {show(action)}; use {names}")
-        found.append(known[str(action)])
+            raise TaskError(
+                f"step {step}: there is no action {clip(repr(action))}; use {names}, or numbers "
+                f"from 0 to {environment.n_actions - 1}"
+            )
+        found.append(known[action])
     return np.array(found, np.int64)
+
+
+def _whole(states: Any) -> Any:
+    """Return the numbers of states, after checking that they are whole."""
+    array = np.asarray(states)
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        raise TaskError(f"states are whole numbers [T + 1], not {array.dtype} {list(array.shape)}")
+    return array.astype(np.int64)

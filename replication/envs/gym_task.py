@@ -9,11 +9,20 @@ from typing import Any
 
 import gymnasium
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from replication.envs.tabular import TabularTask
 from replication.envs.task import Ints, Task, TaskError, Walk
 from replication.envs.wrapped_task import WrappedTask, env_name
+from replication.errors import clip
+
+NAMES = {
+    "FrozenLakeEnv": ("left", "down", "right", "up"),
+    "CliffWalkingEnv": ("up", "right", "down", "left"),
+    "TaxiEnv": ("south", "north", "east", "west", "pick up", "drop off"),
+}
+"""What Gymnasium's documentation calls the actions of its environments, by their class."""
 
 PLAIN = (OrderEnforcing, PassiveEnvChecker, TimeLimit)
 """Wrappers that leave the moves as they are."""
@@ -22,17 +31,18 @@ PLAIN = (OrderEnforcing, PassiveEnvChecker, TimeLimit)
 class GymTask(Task):
     """A Gymnasium environment with discrete observations and actions.
 
-    Where the environment has a table of its moves, as FrozenLake, CliffWalking and Taxi do, it is
-    learned on that table, at the speed of the mazes; otherwise by stepping it.
+    Gymnasium's FrozenLake, CliffWalking and Taxi have a table of their moves, and are learned on
+    it at the speed of the mazes, unless a wrapper may have changed them; others by stepping them.
 
     Parameters
     ----------
     env
-        The environment. A table is used only if no wrapper can have changed the moves.
+        The environment.
     actions
-        Names of the actions; their numbers by default.
+        Names of the actions; by default those of Gymnasium's documentation, or their numbers.
     reset_seed
-        If given, every episode starts where ``env.reset(seed=reset_seed)`` does.
+        If given, every episode starts by ``env.reset(seed=reset_seed)``. This is for environments
+        in which nothing but the start is random.
 
     Raises
     ------
@@ -54,6 +64,8 @@ class GymTask(Task):
         actions: Sequence[str] | None = None,
         reset_seed: int | None = None,
     ) -> None:
+        if not isinstance(env, gymnasium.Env):
+            raise TaskError(f"give an environment, gymnasium.make(...), not {clip(repr(env))}")
         space = env.observation_space
         if not isinstance(space, spaces.Discrete):
             raise TaskError(
@@ -61,26 +73,36 @@ class GymTask(Task):
                 "function that numbers them: WrappedTask(env, state, n_states), see Bins"
             )
         self.env = env
-        table = _table(env)
+        bare = env.unwrapped
+        names = actions or NAMES.get(type(bare).__name__) if _is_plain(env) else actions
+        self._first = int(space.start)
         self.task: TabularTask | WrappedTask
-        if table is None:
-            first = int(space.start)
+        if _is_plain(env):
+            start = bare.initial_state_distrib  # type: ignore[attr-defined]
+            if reset_seed is not None:
+                start = int(env.reset(seed=reset_seed)[0])
+            self.task = TabularTask(bare.P, start=start, actions=names)  # type: ignore[attr-defined]
+            if reset_seed is not None and self.task.is_random:
+                raise TaskError(f"{env_name(env)}: moves are random; leave out reset_seed")
+        else:
             self.task = WrappedTask(
                 env,
-                lambda observation: operator.index(observation) - first,
+                lambda observation: operator.index(observation) - self._first,
                 int(space.n),
-                actions=actions,
+                actions=names,
                 reset_seed=reset_seed,
             )
-        else:
-            start = getattr(env.unwrapped, "initial_state_distrib", None)
-            if start is None or reset_seed is not None:
-                start = int(env.reset(seed=reset_seed)[0])
-            self.task = TabularTask(table, start=start, actions=actions)
+        self.table = self.task.table
         self.n_states, self.actions = self.task.n_states, self.task.actions
         self.reset_seed = reset_seed
         if _is_described(env):
             self.kind = "gymnasium"
+
+    def number(self, observation: Any) -> int:
+        """Return the number of the state that is observed; raises `TaskError` if it is none."""
+        if self.table is None:
+            return self.task.number(observation)
+        return super().number(observation)
 
     @property
     def is_random(self) -> bool:
@@ -109,20 +131,21 @@ class GymTask(Task):
         return {
             "kind": self.kind,
             "id": spec.id,
-            "options": dict(spec.kwargs),
+            "options": _options(spec),
             **seed,
             "actions": list(self.actions),
         }
 
 
-def _table(env: gymnasium.Env[Any, Any]) -> dict[int, Any] | None:
-    """Return the environment's own table of moves, if no wrapper can have changed them."""
+def _is_plain(env: gymnasium.Env[Any, Any]) -> bool:
+    """Return whether an environment moves by Gymnasium's own table."""
     while isinstance(env, gymnasium.Wrapper):
         if not isinstance(env, PLAIN):
-            return None
+            return False
         env = env.env
-    table = getattr(env, "P", None)
-    return table if isinstance(table, dict) else None
+    own = type(env).step.__module__.startswith("gymnasium.envs.toy_text.")
+    tabled = hasattr(env, "P") and hasattr(env, "initial_state_distrib")
+    return own and tabled and not getattr(env, "fickle_passenger", False)
 
 
 def _is_described(env: gymnasium.Env[Any, Any]) -> bool:
@@ -131,6 +154,15 @@ def _is_described(env: gymnasium.Env[Any, Any]) -> bool:
     if spec is None or ":" in spec.id or spec.additional_wrappers:
         return False
     try:
-        return json.loads(json.dumps(dict(spec.kwargs))) == dict(spec.kwargs)
+        return json.loads(json.dumps(_options(spec))) == _options(spec)
     except (TypeError, ValueError):
         return False
+
+
+def _options(spec: EnvSpec) -> dict[str, Any]:
+    """Return what Gymnasium needs to make an environment again, but for how it is shown."""
+    options = {name: value for name, value in spec.kwargs.items() if name != "render_mode"}
+    registered = gymnasium.registry.get(spec.id)
+    if registered and spec.max_episode_steps != registered.max_episode_steps:
+        options["max_episode_steps"] = spec.max_episode_steps
+    return options

@@ -26,9 +26,9 @@ class TabularTask(Task):
         ``P[state][action]`` lists ``(probability, next state, reward, whether the episode ends)``.
     start
         The state in which episodes start, or several, each as likely as the others, or the
-        probability of each, float [state].
+        probability of each state, float [state].
     terminal
-        States in which an episode ends. Gymnasium's table names them itself.
+        The state in which an episode ends, or several. Gymnasium's table names them itself.
     actions
         Names of the actions; their numbers by default.
 
@@ -51,23 +51,28 @@ class TabularTask(Task):
     ([0, 1, 2], False)
     """
 
+    table: Moves
+
     def __init__(
         self,
         moves: ArrayLike | Mapping[int, Mapping[int, Sequence[tuple[Any, ...]]]],
         *,
         start: int | Sequence[int] | ArrayLike = 0,
-        terminal: Iterable[int] = (),
+        terminal: int | Iterable[int] = (),
         actions: Sequence[str] | None = None,
     ) -> None:
-        if isinstance(moves, Mapping):
-            shape, outcomes, ended, loose = _of_gymnasium(moves)
-        else:
-            shape, outcomes = _of_array(np.asarray(moves))
-            ended, loose = [], []
+        try:
+            shape, outcomes, ended, loose = _read(moves)
+        except (TypeError, ValueError, LookupError) as error:
+            if isinstance(error, TaskError):
+                raise
+            raise TaskError(f"moves are no table: {error}") from None
         self.n_states = shape[0]
         self.actions = named_actions(actions, shape[1])
         ends = np.zeros(self.n_states, bool)
-        ends[_states([*ended, *terminal], self.n_states, "terminal")] = True
+        final = [*terminal] if isinstance(terminal, Iterable) else [terminal]
+        for states in (ended, final):
+            ends[_states(states, self.n_states, "terminal")] = True
         starts = _starts(start, self.n_states)
         if (starts[ends] > 0).any():
             first = np.flatnonzero(ends & (starts > 0))[0]
@@ -151,6 +156,13 @@ Outcomes = tuple[list[Any] | Ints, list[Any] | Ints, list[Any] | Ints, list[Any]
 """States, actions, the states that they lead to, and probabilities."""
 
 
+def _read(moves: Any) -> tuple[tuple[int, int], Outcomes, list[int], list[int]]:
+    """Return the shape [state, action], the outcomes, the ends and the loose states of a table."""
+    if isinstance(moves, Mapping):
+        return _of_gymnasium(moves)
+    return *_of_array(np.asarray(moves)), [], []
+
+
 def _of_array(table: NDArray[Any]) -> tuple[tuple[int, int], Outcomes]:
     """Return the shape [state, action] and the outcomes of an array."""
     if table.ndim == 2 and table.dtype.kind in "iu" and table.size:
@@ -198,6 +210,8 @@ def _starts(start: Any, n_states: int) -> Floats:
             f"start must be a state, several states, or {n_states} probabilities, not "
             f"{array.dtype} {list(array.shape)}"
         )
+    if len(np.unique(array)) < len(array):
+        raise TaskError("start names a state twice; write probabilities as 1.0, 0.0, ...")
     chances = np.zeros(n_states)
     chances[_states(array, n_states, "start")] = 1.0
     return chances / chances.sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.errors import UserError
+from replication.envs.moves import Moves
+from replication.errors import UserError, clip
 
 Ints = NDArray[np.int64]
 
@@ -31,7 +33,8 @@ class Task(ABC):
     """An environment with finitely many states and actions, known by their numbers.
 
     It does what :class:`replication.envs.environment.Environment` asks for. A subclass says how
-    actions lead from state to state.
+    actions lead from state to state, and has what an agent learns on: the `table` of its moves, or
+    an `env` of Gymnasium to step.
 
     Attributes
     ----------
@@ -46,6 +49,8 @@ class Task(ABC):
     kind = "own"
     n_states: int
     actions: tuple[str, ...]
+    table: Moves | None = None
+    env: Any = None
 
     @property
     def n_actions(self) -> int:
@@ -56,6 +61,17 @@ class Task(ABC):
     @abstractmethod
     def is_random(self) -> bool:
         """Whether the same actions may lead to different states."""
+
+    def number(self, observation: Any) -> int:
+        """Return the number of the state that is observed; raises `TaskError` if it is none."""
+        try:
+            number = operator.index(observation)
+        except TypeError:
+            number = -1
+        if not 0 <= number < self.n_states:
+            shown = clip(repr(observation).replace("\n", " "))
+            raise TaskError(f"there is no state {shown}; states are 0..{self.n_states - 1}")
+        return number
 
     @abstractmethod
     def walk(self, actions: Sequence[int]) -> Walk:
@@ -75,7 +91,12 @@ class Task(ABC):
 
     def replay(self, actions: Iterable[int]) -> Ints:
         """Return the states that T actions visit from the start on, int64 [T + 1]."""
-        return self.walk([int(action) for action in actions]).states
+        numbers = [int(action) for action in actions]
+        for step, action in enumerate(numbers, start=1):
+            if not 0 <= action < self.n_actions:
+                last = self.n_actions - 1
+                raise TaskError(f"step {step} takes action {action}; actions are 0..{last}")
+        return self.walk(numbers).states
 
     def goal_step(self, actions: Iterable[int]) -> int | None:
         """Return the number of actions: which of them may end an episode, `fault` checks."""

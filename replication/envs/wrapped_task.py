@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import operator
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -38,8 +36,8 @@ class WrappedTask(Task):
     actions
         Names of the actions; their numbers by default.
     reset_seed
-        If given, every episode starts by ``env.reset(seed=reset_seed)``: where only the start is
-        random, all episodes then start in the same state.
+        If given, every episode starts by ``env.reset(seed=reset_seed)``. This is for environments
+        in which nothing but the start is random: all luck is the same in every episode.
 
     Raises
     ------
@@ -108,7 +106,8 @@ class WrappedTask(Task):
     def walk(self, actions: Sequence[int]) -> Walk:
         """Return where actions lead; raises `TaskError` if they lead elsewhere another time."""
         walks = [self._walk(actions, seed) for seed in PROBES]
-        if any(walk.states.tolist() != walks[0].states.tolist() for walk in walks[1:]):
+        same = all(walk.states.tolist() == walks[0].states.tolist() for walk in walks[1:])
+        if self.is_random or not same:
             raise TaskError(
                 f"{self.name}: moves or the start are random: give the states as well as the "
                 "actions"
@@ -123,10 +122,9 @@ class WrappedTask(Task):
         wrong = out_of_range(states, actions, self.n_states, self.n_actions)
         if wrong:
             return wrong
-        walks = [self._walk(actions.tolist(), seed) for seed in PROBES]
-        first = walks[0]
-        if any(walk.states.tolist() != first.states.tolist() for walk in walks[1:]):
+        if self.is_random:
             return None
+        first = self._walk(actions.tolist(), PROBES[0])
         for step, (found, claim) in enumerate(zip(first.states, states, strict=False)):
             if found != claim:
                 if step == 0:
@@ -172,54 +170,6 @@ class WrappedTask(Task):
             if ended or cut:
                 observation, _ = self.env.reset()
         return states
-
-
-@dataclass(frozen=True)
-class Bins:
-    """Numbers a vector by cutting the range of each of its parts into equal bins.
-
-    Parameters
-    ----------
-    low, high
-        The range of each part; what lies outside counts to the nearest bin.
-    counts
-        Number of bins of each part.
-
-    Examples
-    --------
-    >>> bins = Bins(low=[0, 0], high=[1, 1], counts=[2, 5])
-    >>> bins.n_states, bins([0.4, 0.9]), bins([9.0, -9.0])
-    (10, 4, 5)
-    """
-
-    low: Sequence[float]
-    high: Sequence[float]
-    counts: Sequence[int]
-
-    @property
-    def n_states(self) -> int:
-        """Number of states: the product of the counts."""
-        return math.prod(self.counts)
-
-    def __post_init__(self) -> None:
-        low, high, counts = np.array(self.low), np.array(self.high), np.array(self.counts)
-        fits = low.shape == high.shape == counts.shape == (counts.size,)
-        fits = fits and bool(np.isfinite([low, high]).all() and (low < high).all())
-        if not fits or counts.min(initial=1) < 1:
-            raise TaskError(
-                "Bins: low, high and counts need a finite number for each part of an observation, "
-                "low below high and at least one bin"
-            )
-
-    def __call__(self, observation: Iterable[float]) -> int:
-        """Return the number of an observation's bin."""
-        number = 0
-        for value, low, high, count in zip(
-            observation, self.low, self.high, self.counts, strict=True
-        ):
-            bin = int((min(max(value, low), high) - low) / (high - low) * count)
-            number = number * count + min(bin, count - 1)
-        return number
 
 
 class _Restarted(gymnasium.Wrapper[Any, Any, Any, Any]):

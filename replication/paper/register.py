@@ -48,10 +48,8 @@ class Choice:
 
     @property
     def others(self) -> str:
-        """What is compared with the paper besides the default, in words."""
-        if self.alternatives or self.range is None:
-            return ", ".join(map(str, self.alternatives))
-        return f"{self.range[0]:g} to {self.range[1]:g}"
+        """The other values that the register lists, in words."""
+        return ", ".join(map(str, self.alternatives))
 
     def registered(self, value: Any) -> Value:
         """Return `value` as `check` does; raises `ChoiceError` if it is not listed."""

@@ -26,14 +26,6 @@ AGENT, WAY, GOAL, WALL, PLAIN = "\x1b[1;31m", "\x1b[36m", "\x1b[1;32m", "\x1b[2m
 HEADS = {"up": "^", "down": "v", "right": ">", "left": "<"}
 
 
-NAMES = {
-    "FrozenLakeEnv": ("left", "down", "right", "up"),
-    "CliffWalkingEnv": ("up", "right", "down", "left"),
-    "TaxiEnv": ("south", "north", "east", "west", "pick up", "drop off"),
-}
-"""What Gymnasium's documentation calls the actions of its environments that draw text, by class."""
-
-
 @dataclass(frozen=True)
 class Scene:
     """What came of some actions.
@@ -88,7 +80,7 @@ def as_world(given: Any) -> World:
         bare = given.unwrapped
         if isinstance(bare, MazeEnv):
             return _Known(bare.maze)
-        given = GymTask(given, actions=NAMES.get(type(bare).__name__))
+        given = GymTask(given)
     if isinstance(given, GymTask | WrappedTask):
         return _Stepped(given)
     if isinstance(given, TabularTask) and given.is_random:
@@ -197,7 +189,12 @@ class _Stepped:
         inner = task.task if isinstance(task, GymTask) else task
         self._number: Callable[[Any], int] = int
         if isinstance(inner, WrappedTask):
-            self._env, self._number = copy.deepcopy(inner.env), inner.number
+            try:
+                self._env, self._number = copy.deepcopy(inner.env), inner.number
+            except TypeError as error:
+                raise UserError(
+                    f"{inner.name} cannot be copied, so not recorded: {error}"
+                ) from None
         else:
             self._env = _drawn_as_text(task.env)
         self._seed = task.reset_seed if isinstance(task, GymTask) else None

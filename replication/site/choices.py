@@ -65,7 +65,8 @@ def _section(entry: Choice) -> Iterator[str]:
     if rest:
         yield f"{rest}\n"
     yield f"**Ours:** `{entry.default}`. {entry.rule}"
-    yield f"**Also compared with the paper:** {entry.others or 'nothing else'}.\n"
+    own = f" In a task of your own: {entry.accepted}." if entry.range else ""
+    yield f"**Also listed:** {entry.others or 'nothing else'}.{own}\n"
     yield f"{{.provenance}}\n{entry.id} · {entry.place} · `{where}`\n"
 
 

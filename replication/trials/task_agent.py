@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +11,7 @@ from numpy.typing import NDArray
 from replication.envs.environment import Environment
 from replication.envs.gym_task import GymTask
 from replication.envs.moves import Moves
-from replication.envs.tabular import TabularTask
-from replication.envs.task import TaskError
-from replication.envs.wrapped_task import WrappedTask
+from replication.envs.task import Task, TaskError
 from replication.irl.agent import Agent, Episode
 from replication.learning import chance, planning, stepped
 from replication.paper.params import Params
@@ -54,7 +50,7 @@ class ChanceAgent:
 class SteppedAgent:
     """Q-learning (Eq. 1) and greedy episodes in an environment that can only be stepped."""
 
-    task: WrappedTask
+    task: Task
     params: Params
 
     def __post_init__(self) -> None:
@@ -68,15 +64,13 @@ class SteppedAgent:
 
     def learn(self, weights: Array, q: Array, stream: Stream) -> tuple[Array, Stream, int, int]:
         """Learn by Q-learning, see :func:`replication.learning.stepped.learn`."""
-        env, state = self.task.env, self.task.state
-        with _numbered(self.task):
-            return stepped.learn(env, state, weights, q, stream, **_learning(self.params))
+        env, number = self.task.env, self.task.number
+        return stepped.learn(env, number, weights, q, stream, **_learning(self.params))
 
     def roll_out(self, q: Array, stream: Stream) -> tuple[Episode, Stream]:
         """Follow the greedy policy, see :func:`replication.learning.stepped.roll_out`."""
-        env, state = self.task.env, self.task.state
-        with _numbered(self.task):
-            return _episode(*stepped.roll_out(env, state, q, stream, **_rolling(self.params)))
+        env, number = self.task.env, self.task.number
+        return _episode(*stepped.roll_out(env, number, q, stream, **_rolling(self.params)))
 
 
 def make_agent(environment: Environment, params: Params) -> Agent:
@@ -100,24 +94,11 @@ def make_agent(environment: Environment, params: Params) -> Agent:
     if learner.solver == "planning" and learner.gamma == 1:
         raise ChoiceError("planning needs a discount below 1: set gamma = 0.99")
     task = environment.task if isinstance(environment, GymTask) else environment
-    if isinstance(task, TabularTask):
+    if isinstance(task, Task) and task.table is not None:
         return ChanceAgent(task.table, params)
-    if isinstance(task, WrappedTask):
+    if isinstance(task, Task) and task.env is not None:
         return SteppedAgent(task, params)
-    raise TaskError(f"an environment of kind {environment.kind!r} has no agent")
-
-
-@contextmanager
-def _numbered(task: WrappedTask) -> Iterator[None]:
-    """Turn what goes wrong when a state is no number of a state into one line."""
-    try:
-        yield
-    except (TypeError, ValueError) as error:
-        if isinstance(error, TaskError):
-            raise
-        raise TaskError(
-            f"{task.name}: each state must be a whole number from 0 to {task.n_states - 1}: {error}"
-        ) from error
+    raise TaskError("an agent needs a task that has a table of moves or an environment to step")
 
 
 def _learning(params: Params) -> dict[str, Any]:

@@ -63,7 +63,7 @@ def test_what_is_registered_is_told_from_what_is_accepted() -> None:
     message = r"^Some\.step = 3 is not registered \(STEP\): use 4 or 1, 2$"
     with pytest.raises(ChoiceError, match=message):
         STEP.registered(3)
-    assert (WHOLE.others, WORD.others, STEP.others) == ("1 to 9", "kept, reset", "1, 2")
+    assert (WHOLE.others, WORD.others, STEP.others) == ("", "kept, reset", "1, 2")
 
 
 def test_fields_and_entries_match() -> None:
