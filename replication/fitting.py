@@ -22,7 +22,7 @@ from replication.irl import Method
 from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
-from replication.result import Fit, FitError, open_ends, taken
+from replication.result import Fit, FitError, taken
 from replication.trials.condition import Condition
 
 if TYPE_CHECKING:  # it takes long to import
@@ -31,7 +31,10 @@ if TYPE_CHECKING:  # it takes long to import
 ROLLOUTS = 100
 """Trajectories behind each expectation (Eq. 7) where moves are random."""
 
-PLATEAU = 25
+LIMIT = "max_episode_steps"
+"""What Gymnasium calls the horizon of an environment."""
+
+PLATEAU = 50
 """Iterations without a smaller error that end a fit where d = 0 cannot be reached."""
 
 Array = NDArray[np.float64]
@@ -115,6 +118,8 @@ def fit(
     (True, True)
     """
     checked = _checked(demos, task)
+    if "incorrect" in values:
+        checked = checked.select(values.pop("incorrect"))
     if not isinstance(seed, int) or seed < 0:
         raise FitError(f"seed = {clip(repr(seed))} must be a whole number, at least 0")
     if params is not None and values:
@@ -136,7 +141,7 @@ def fit(
         errors=trial.errors,
         converged=trial.converged,
     )
-    for doubt in open_ends(result):
+    for doubt in (*_open_ends(result), *_untrained(result)):
         warnings.warn(doubt, DemoWarning, stacklevel=2)
     return result
 
@@ -183,16 +188,30 @@ def own_params(demos: Demos, **values: Any) -> Params:
 
     All incorrect demonstrations are used. Where moves are random, `ROLLOUTS` trajectories stand
     behind each expectation; where moves are random or correct demonstrations differ, a fit ends
-    after `PLATEAU` iterations without a smaller error. All else is as in the register.
+    after `PLATEAU` iterations without a smaller error. The horizon is that of the environment, if
+    it has one that is shorter. All else is as in the register.
     """
     is_random = isinstance(demos.environment, Task) and demos.environment.is_random
     ways = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
+    limit = getattr(getattr(getattr(demos.environment, "env", None), "spec", None), LIMIT, None)
+    usual = Params().learner.horizon
     suited = {
         "incorrect": "all",
+        "horizon": min(usual, limit or usual),
         "rollouts": ROLLOUTS if is_random else 1,
         "plateau": PLATEAU if is_random or len(ways) > 1 else 0,
     }
     return Params.of(**suited | values)
+
+
+def _untrained(result: Fit) -> list[str]:
+    """Return a word on a result that is no better than an agent that has learned nothing."""
+    if result.converged or not result.params.loop.plateau or result.errors.argmin():
+        return []
+    return [
+        f"nothing was better than the untrained agent in {result.iterations} iterations, so the "
+        f"reward is that of the start; set plateau = {4 * result.params.loop.plateau}"
+    ]
 
 
 def _checked(demos: Demos | Mapping[str, Iterable[Trajectory]], task: Environment | None) -> Demos:
@@ -207,3 +226,19 @@ def _checked(demos: Demos | Mapping[str, Iterable[Trajectory]], task: Environmen
     for doubt in doubts(made):
         warnings.warn(doubt, DemoWarning, stacklevel=3)
     return made
+
+
+def _open_ends(result: Fit) -> list[str]:
+    """Return why d = 0 is out of reach where the horizon does not suit a correct demonstration."""
+    task, horizon = result.demos.environment, result.params.learner.horizon
+    for demo in result.demos.correct:
+        steps = len(demo.actions)
+        if steps > horizon:
+            return [f"correct demo {show(demo.name)} has {steps} steps, but horizon = {horizon}"]
+        open_end = isinstance(task, Task) and task.is_over(demo.states, demo.actions) is False
+        if open_end and steps < horizon:
+            return [
+                f"correct demo {show(demo.name)} stops after {steps} steps, but the episode goes "
+                f"on: the agent drives on to the horizon, so set horizon = {steps}"
+            ]
+    return []

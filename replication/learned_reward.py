@@ -6,7 +6,9 @@ from typing import Any
 
 import gymnasium
 
-from replication.result import Fit
+from replication.envs.wrapped_task import WrappedTask
+from replication.errors import clip
+from replication.result import Fit, FitError
 
 
 class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -19,6 +21,11 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
         task: state numbers, or whatever the task's function numbers.
     result
         What was learned in it, or in one with the same states.
+
+    Raises
+    ------
+    FitError
+        If the environment has other numbers of states or actions.
 
     Notes
     -----
@@ -38,6 +45,16 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(self, env: gymnasium.Env[Any, Any], result: Fit) -> None:
         super().__init__(env)
+        if not isinstance(result, Fit):
+            raise FitError(f"give a fit, Fit.load(path), not {clip(repr(result))}")
+        task = result.demos.environment
+        for what, space, due in (
+            ("states", env.observation_space, task.n_states),
+            ("actions", env.action_space, task.n_actions),
+        ):
+            found = getattr(space, "n", due)
+            if found != due and not (what == "states" and isinstance(task, WrappedTask)):
+                raise FitError(f"the fit has {due} {what}, the environment {found}")
         self.result = result
         self._observation: Any = None
         self._first = int(getattr(env.action_space, "start", 0))

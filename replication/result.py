@@ -19,7 +19,7 @@ from replication.demos.model import Demos
 from replication.demos.tasks import action_numbers
 from replication.envs.environment import Environment
 from replication.envs.task import Task
-from replication.errors import UserError, clip, show
+from replication.errors import UserError, clip
 from replication.files import FileError, read_json, write_file
 from replication.paper.params import Params
 
@@ -229,16 +229,3 @@ _ARRAYS: dict[str, type] = {
 def taken(errors: NDArray[np.float64], params: Params) -> int:
     """Return the iteration whose weights are the result, see :class:`replication.irl.Trial`."""
     return int(errors.argmin()) if params.loop.plateau else len(errors) - 1
-
-
-def open_ends(result: Fit) -> list[str]:
-    """Return why d = 0 is out of reach if a correct demonstration stops before its episode ends."""
-    task, horizon = result.demos.environment, result.params.learner.horizon
-    if not isinstance(task, Task):
-        return []
-    return [
-        f"correct demo {show(demo.name)} stops after {len(demo.actions)} steps, but the episode "
-        f"goes on: the agent drives on to the horizon, so set horizon = {len(demo.actions)}"
-        for demo in result.demos.correct
-        if len(demo.actions) < horizon and task.is_over(demo.states, demo.actions) is False
-    ][:1]

@@ -60,10 +60,14 @@ def screen(told: str, columns: int) -> list[str]:
 
 
 CONTROLLED = (
-    "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "import fcntl, os, signal, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "signal.signal(signal.SIGINT, signal.SIG_DFL); "
     "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
 )
-"""Makes standard input the terminal whose Ctrl-C interrupts, then runs Python."""
+"""Makes standard input the terminal whose Ctrl-C interrupts, then runs Python.
+
+Processes of a shell's background ignore Ctrl-C, and so would what they start.
+"""
 
 PATIENCE = 300.0
 """Seconds after which a screen that does not come is a failure."""

@@ -91,13 +91,13 @@ def test_two_ways_end_on_a_plateau_with_a_word() -> None:
     assert result.iterations == result.errors.argmin() + PLATEAU
     assert result.error == result.errors.min()
     assert [action for _, action in result.path[:-1]] in (ACROSS, ALONG)
-    assert "no smaller d in 25 iterations" in result.summary()
+    assert f"no smaller d in {PLATEAU} iterations" in result.summary()
 
 
 def test_slippery_ice_is_learned_from_many_demonstrations() -> None:
     """Where moves are random, the policy of the demonstrations comes out again."""
     task = lake(slippery=True)
-    table = task.env.unwrapped.P  # type: ignore[attr-defined]
+    table = task.env.unwrapped.P
     reward = np.array(
         [[sum(p * r for p, _, r, _ in table[s][a]) for a in range(4)] for s in range(16)]
     )
@@ -140,6 +140,8 @@ def test_values_by_name_are_parameters(small_demos: Demos) -> None:
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
+        (None, {"seed": -1}, "seed = -1 must be a whole number, at least 0"),
+        (None, {"task": gymnasium.make("FrozenLake-v1")}, r"is no task; wrap it: GymTask.env."),
         ({"correct": [[0]]}, {}, r"need their environment: fit\(\.\.\., task=\.\.\.\)"),
         (None, {"params": Params(), "alpha": 0.2}, "give alpha = 0.2 or params, not both"),
         (None, {"alhpa": 0.2}, "unknown parameter 'alhpa' .did you mean 'alpha'"),
@@ -166,6 +168,38 @@ def test_a_demonstration_that_stops_too_early_is_told() -> None:
         fit({"correct": [["go", "stay"]]}, task=endless, seed=1, max_iterations=1)
     result = fit({"correct": [["go", "stay"]]}, task=endless, seed=1, horizon=2)
     assert result.converged
+
+
+def test_a_demonstration_beyond_the_horizon_is_told(small_demos: Demos) -> None:
+    """No agent can go on longer than the horizon lets it."""
+    with pytest.warns(DemoWarning, match=r"has \d+ steps, but horizon = 2"):
+        fit(small_demos, seed=1, horizon=2, max_iterations=1)
+
+
+def test_a_reward_of_nothing_is_told() -> None:
+    """If nothing is better than the untrained agent, a warning says so and what to try."""
+    coin = TabularTask(np.array([[[0.5, 0.5]] * 2, [[0.0, 1.0]] * 2]), terminal=[1])
+    ways = [([0, 1], [0]), ([0, 1], [1])]
+    with pytest.warns(DemoWarning) as told:
+        result = fit({"correct": ways}, task=coin, seed=1, plateau=1, rollouts=2000)
+    assert not result.weights.any()
+    assert any("nothing was better than the untrained" in str(one.message) for one in told)
+
+
+def test_the_horizon_is_that_of_the_environment() -> None:
+    """An environment that cuts its episodes earlier than we do gives the horizon."""
+    short = gymnasium.make("FrozenLake-v1", is_slippery=False, max_episode_steps=30)
+    for env, due in ((short, 30), (gymnasium.make("CliffWalking-v1"), 500)):
+        demos = make_demos(GymTask(env), {"correct": [[0]]})
+        assert own_params(demos).learner.horizon == due
+
+
+def test_kinds_of_mistakes_are_chosen_by_name() -> None:
+    """A user's own kinds are taken as `incorrect`, alone or together."""
+    ways = {"correct": [ACROSS], "hole": [["right", "down"]], "bump": [["left"]]}
+    for kinds in ("hole", "hole+bump", "none"):
+        result = fit(ways, task=lake(), seed=1, incorrect=kinds)
+        assert "+".join(result.demos.kinds) == kinds.replace("none", "")
 
 
 def test_many_fits_are_a_table() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 from replication import Bins, GymTask, LearnedReward, WrappedTask, fit
 from replication.result import FitError
@@ -62,10 +63,55 @@ def test_observations_are_numbered_as_in_the_task() -> None:
     assert learned.step(2)[1] == result.weights[bins(observation), 2]
 
 
-def test_a_foreign_environment_is_refused_in_one_line() -> None:
-    """A state that the task does not have has no reward."""
-    result = fit({"correct": [ACROSS]}, task=GymTask(lake()), seed=1)
-    learned = LearnedReward(gymnasium.make("CliffWalking-v1"), result)
+class FromOne(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Counts states and actions from 1."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        super().__init__(env)
+        self.observation_space = spaces.Discrete(16, start=1)
+        self.action_space = spaces.Discrete(4, start=1)
+
+    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
+        """Start an episode."""
+        state, info = self.env.reset(**options)
+        return state + 1, info
+
+    def step(self, action: Any) -> Any:
+        """Take an action."""
+        state, *rest = self.env.step(action - 1)
+        return state + 1, *rest
+
+
+def test_counting_from_one_changes_nothing() -> None:
+    """States, actions and names that are digits keep their meaning through fit and reward."""
+    env = FromOne(lake())
+    names = ("1", "2", "3", "4")
+    result = fit({"correct": [ACROSS]}, task=GymTask(env, actions=names), seed=1)
+    plain = fit({"correct": [ACROSS]}, task=GymTask(FromOne(lake())), seed=1)
+    np.testing.assert_array_equal(result.weights, plain.weights)
+    assert result.predict(1) == "2"
+    learned = LearnedReward(FromOne(lake()), result)
     learned.reset(seed=1)
-    with pytest.raises(FitError, match=r"there is no state .*36.*; states are 0\.\.15$"):
-        learned.step(0)
+    assert learned.step(2)[1] == result.weights[0, 1] != 0
+
+
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        (gymnasium.make("CliffWalking-v1"), "the fit has 16 states, the environment 48"),
+        (gymnasium.make("Blackjack-v1"), "the fit has 4 actions, the environment 2"),
+    ],
+)
+def test_a_foreign_environment_is_refused_in_one_line(
+    env: gymnasium.Env[Any, Any], message: str
+) -> None:
+    """An environment with other states or actions has no such reward."""
+    result = fit({"correct": [ACROSS]}, task=GymTask(lake()), seed=1)
+    with pytest.raises(FitError, match=message):
+        LearnedReward(env, result)
+
+
+def test_a_file_is_no_fit() -> None:
+    """Instead of a path a fit is asked for."""
+    with pytest.raises(FitError, match=r"give a fit, Fit\.load\(path\), not 'result\.json'"):
+        LearnedReward(lake(), "result.json")  # type: ignore[arg-type]

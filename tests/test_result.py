@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from replication import (
-    Bins,
     Demos,
     Fit,
     GymTask,
@@ -23,6 +22,8 @@ from replication.errors import UserError
 from replication.result import FitError
 from tests.conftest import Spoil
 
+LAKE = ("left", "down", "right", "up")
+ACROSS = ["down", "down", "right", "down", "right", "right"]
 CORRIDOR = TabularTask([[0, 1], [0, 2], [2, 2]], terminal=[2], actions=("back", "on"))
 
 
@@ -103,19 +104,28 @@ def test_rewards_are_the_weights(corridor: Fit) -> None:
 def test_unseen_states_are_one_line(corridor: Fit, state: Any) -> None:
     """What is no state of the task has neither action nor reward."""
     for ask in (corridor.predict, lambda state: corridor.reward(state, "on")):
-        with pytest.raises(FitError, match=r"there is no state .*; states are 0\.\.2$"):
+        with pytest.raises(UserError, match=r"there is no state .*; states are 0\.\.2$"):
             ask(state)
     with pytest.raises(TaskError, match="there is no action 'away'"):
         corridor.reward(0, "away")
 
 
 def test_observations_are_numbered_by_the_task() -> None:
-    """Where a function numbers observations, these may be asked for."""
-    bins = Bins(low=[-1.2, -0.07], high=[0.6, 0.07], counts=[4, 4])
-    task = WrappedTask(gymnasium.make("MountainCar-v0"), bins, reset_seed=1)
-    result = fit({"correct": [[2, 2]]}, task=task, seed=1, horizon=2, episodes=5, max_iterations=2)
-    observation, _ = task.env.reset()
-    assert result.predict(observation) == result.predict(bins(observation))
+    """A function's numbers count, whatever the observation itself looks like."""
+    env = gymnasium.make("FrozenLake-v1", is_slippery=False)
+    task = WrappedTask(env, lambda seen: 15 - int(seen), 16, actions=LAKE)
+    result = fit({"correct": [ACROSS]}, task=task, seed=1)
+    seen = [0, 4, 8, 9, 13, 14]
+    assert [result.predict(one) for one in seen] == ACROSS
+    assert result.policy()[[15 - one for one in seen]].tolist() == [LAKE.index(a) for a in ACROSS]
+
+
+@pytest.mark.parametrize("cell", [(9, 9), (), (0,), ((0, 1), 2)])
+def test_cells_that_are_none_are_refused(fitted: Fit, cell: Any) -> None:
+    """Row and column are two numbers of the maze; a list or an array will do as well."""
+    with pytest.raises(FitError, match="there is no state"):
+        fitted.predict(cell)
+    assert fitted.predict([0, 0]) == fitted.predict(np.array([0, 0])) == fitted.predict((0, 0))
 
 
 # --- pictures --------------------------------------------------------------------------------

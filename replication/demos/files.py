@@ -156,12 +156,13 @@ def doubts(demos: Demos) -> list[str]:
             "which a single deterministic trajectory cannot match"
         )
     right = state_action_pairs(*demos.correct)
-    messages += [
-        f"incorrect demo {show(demo.name)} has no effect: all its pairs of state and action "
-        "occur in a correct demo, too"
-        for demo in demos.incorrect
-        if state_action_pairs(demo) <= right
-    ]
+    idle = [demo for demo in demos.incorrect if state_action_pairs(demo) <= right]
+    shown = f"incorrect demo {show(idle[0].name)} has" if len(idle) == 1 else ""
+    shown = shown or f"{len(idle)} incorrect demos ({show(idle[0].name)}, ...) have" if idle else ""
+    if idle:
+        messages.append(
+            f"{shown} no effect: all their pairs of state and action occur in a correct demo, too"
+        )
     return messages
 
 

@@ -64,6 +64,8 @@ def make_demos(
 
 
 def _demo(environment: Environment, kind: str, name: str, way: Trajectory) -> Demo:
+    if isinstance(way, str):
+        raise DemoError(f"demo {show(name)} is {show(way)}; each is a list of actions: [[...]]")
     states: Any = None
     actions: Any = way
     try:

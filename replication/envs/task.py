@@ -52,6 +52,11 @@ class Task(ABC):
     table: Moves | None = None
     env: Any = None
 
+    def __repr__(self) -> str:
+        luck = ", random" if self.is_random else ""
+        kind = type(self).__name__
+        return f"<{kind} of {self.n_states} states and {self.n_actions} actions{luck}>"
+
     @property
     def n_actions(self) -> int:
         """Number of actions."""
@@ -96,7 +101,10 @@ class Task(ABC):
             if not 0 <= action < self.n_actions:
                 last = self.n_actions - 1
                 raise TaskError(f"step {step} takes action {action}; actions are 0..{last}")
-        return self.walk(numbers).states
+        walk = self.walk(numbers)
+        if len(walk.states) <= len(numbers):
+            raise TaskError(f"it goes on after the episode has ended at step {walk.end}; drop it")
+        return walk.states
 
     def goal_step(self, actions: Iterable[int]) -> int | None:
         """Return the number of actions: which of them may end an episode, `fault` checks."""

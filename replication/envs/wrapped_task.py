@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import operator
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -47,6 +48,7 @@ class WrappedTask(Task):
 
     Examples
     --------
+    >>> from replication import Bins
     >>> env = gymnasium.make("MountainCar-v0")
     >>> task = WrappedTask(env, Bins(low=[-1.2, -0.07], high=[0.6, 0.07], counts=[20, 20]))
     >>> task.n_states, task.n_actions, task.is_random
@@ -154,19 +156,20 @@ class WrappedTask(Task):
         return Walk(np.array(states, np.int64), end)
 
     def _trial(self, seed: int) -> list[int]:
-        """Take the same actions whatever the seed; look at each observation twice."""
+        """Take the same actions whatever the seed; number each observation before and after one."""
         draws = np.random.default_rng(0).integers(self.n_actions, size=STEPS).tolist()
         states: list[int] = []
         observation, _ = self.env.reset(seed=seed)
         for action in draws:
             states.append(self.number(observation))
-            if (again := self.number(observation)) != states[-1]:
-                shown = clip(str(observation).replace("\n", " "))
-                raise TaskError(
-                    f"{self.name}: the state of observation {shown} is once {states[-1]} and "
-                    f"once {again}; it must depend on the observation alone"
-                )
+            seen = copy.deepcopy(observation)
             observation, _, ended, cut, _ = self.env.step(action)
+            if (again := self.number(seen)) != states[-1]:
+                shown = clip(str(seen).replace("\n", " "))
+                raise TaskError(
+                    f"{self.name}: the state of observation {shown} is once {states[-1]} and once "
+                    f"{again}; it must depend on the observation alone"
+                )
             if ended or cut:
                 observation, _ = self.env.reset()
         return states

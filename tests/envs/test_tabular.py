@@ -54,7 +54,7 @@ def test_outcomes_of_gymnasium_are_added_up() -> None:
 
 
 @pytest.mark.parametrize(
-    ("start", "starts"), [(1, [1]), ([0, 1], [0, 1]), ([0.25, 0.75, 0.0], [0, 1]), ([1, 1], [1])]
+    ("start", "starts"), [(1, [1]), ([0, 1], [0, 1]), ([0.25, 0.75, 0.0], [0, 1])]
 )
 def test_start_is_a_state_or_several(start: Any, starts: list[int]) -> None:
     """A start is one state, equally likely ones, or a probability for each."""
@@ -100,11 +100,15 @@ def test_random_moves_are_refused_only_where_impossible() -> None:
         ([[0, 3]], {}, "moves: there is no state 3; states are 0..0"),
         ([[0.5, 1.0]], {}, r"moves must be integers .*not float64 \[1, 2\]"),
         ([], {}, "moves must be integers"),
+        ({}, {}, "moves are no table"),
+        ([[0, 1], [1]], {}, "moves are no table"),
+        ({0: {0: [(1.0, 0, False)]}}, {}, "moves are no table"),
         ([[[0.5, 0.4]], [[0.0, 1.0]]], {}, r"state 0, action 0 must sum to 1, not 0\.9"),
         ([[[1.5, -0.5]], [[0.0, 1.0]]], {}, "probabilities must"),
         ([[[float("nan"), 1.0]], [[0.0, 1.0]]], {}, "probabilities must"),
         (CORRIDOR, {"terminal": [3]}, "terminal: there is no state 3"),
         (CORRIDOR, {"terminal": [0]}, "start: an episode would end in state 0 at once"),
+        (CORRIDOR, {"start": [1, 0, 0]}, "start names a state twice; write probabilities as"),
         (CORRIDOR, {"start": 7}, "start: there is no state 7"),
         (CORRIDOR, {"start": "a"}, "start must be a state, several states, or 3 probabilities"),
         (CORRIDOR, {"start": [0.5, 0.2, 0.2]}, "the starts must sum to 1"),
@@ -119,6 +123,15 @@ def test_a_table_that_is_none_is_refused_in_one_line(
     with pytest.raises(TaskError, match=message) as caught:
         TabularTask(moves, **options)
     assert "\n" not in str(caught.value)
+
+
+def test_one_end_needs_no_list() -> None:
+    """A single terminal state may stand for itself; a replay knows no other actions."""
+    task = TabularTask(CORRIDOR, terminal=2)
+    assert task.walk([1, 1]).end == 2
+    with pytest.raises(TaskError, match=r"step 2 takes action 7; actions are 0\.\.1"):
+        task.replay([1, 7])
+    assert repr(task) == "<TabularTask of 3 states and 2 actions>"
 
 
 def test_description_tells_tables_apart() -> None:

@@ -69,6 +69,13 @@ def test_a_function_that_numbers_no_states_is_refused(
     assert "\n" not in str(caught.value)
 
 
+def test_a_function_that_looks_at_the_environment_is_refused() -> None:
+    """The number of an observation may not change while the environment moves on."""
+    env = gymnasium.make("FrozenLake-v1", is_slippery=False)
+    with pytest.raises(TaskError, match="must depend on the observation alone"):
+        WrappedTask(env, lambda _: env.unwrapped.s, 16)  # type: ignore[attr-defined]
+
+
 @given(
     st.lists(st.tuples(st.floats(-5, 5), st.floats(0.1, 5), st.integers(1, 7)), min_size=1).map(
         lambda parts: parts[:4]

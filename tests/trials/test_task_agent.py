@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 
-from replication import Bins, GymTask, Maze, Params, TabularTask, TaskError, WrappedTask
+from replication import Bins, GymTask, Maze, Params, TabularTask, Task, TaskError, WrappedTask, fit
 from replication.envs.gym import MazeEnv
+from replication.envs.task import Walk
 from replication.learning import reference
 from replication.learning.seeds import stream
 from replication.paper.register import ChoiceError
@@ -97,7 +99,7 @@ def test_a_function_that_errs_while_learning_is_one_line(wrong: Any) -> None:
     env = gymnasium.make("MountainCar-v0")
     task = WrappedTask(env, lambda _: 0 if next(calls) < 2000 else wrong, 4)
     agent = make_agent(task, Params.of(episodes=100, horizon=100))
-    with pytest.raises(TaskError, match=r"^MountainCar-v0: each state must be a whole number"):
+    with pytest.raises(TaskError, match=r"^MountainCar-v0: the state of .*must be a whole"):
         agent.learn(np.zeros(agent.shape), np.zeros(agent.shape), words())
 
 
@@ -126,5 +128,43 @@ def test_planning_without_a_discount_is_refused() -> None:
 
 def test_mazes_have_an_agent_of_their_own() -> None:
     """The agent of tasks refuses what is no task."""
-    with pytest.raises(TaskError, match="an environment of kind 'maze' has no agent"):
+    with pytest.raises(TaskError, match="an agent needs a task that has a table of moves"):
         make_task_agent(MAZE, Params())
+
+
+class Stairs(Task):
+    """A task that somebody else wrote: five steps up, and what an agent learns on."""
+
+    n_states = 6
+    actions = ("stay", "up")
+
+    def __init__(self) -> None:
+        moves = [[k, min(k + 1, 5)] for k in range(6)]
+        self.table = TabularTask(moves, terminal=5).table
+
+    @property
+    def is_random(self) -> bool:
+        """Nothing is."""
+        return False
+
+    def walk(self, actions: Sequence[int]) -> Walk:
+        """Count the steps up."""
+        states = np.minimum(np.cumsum([0, *actions]), 5)
+        return Walk(states, len(actions) if states[-1] == 5 else None)
+
+    def fault(self, states: Any, actions: Any) -> str | None:
+        """Find nothing."""
+        return None
+
+    def is_over(self, states: Any, actions: Any) -> bool:
+        """Return whether one is at the top."""
+        return bool(states[-1] == 5)
+
+    def describe(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {"kind": "own", "states": 6, "actions": ["stay", "up"]}
+
+
+def test_a_task_of_another_class_is_learned() -> None:
+    """What does all that a `Task` must do needs no other change."""
+    assert fit({"correct": [["up"] * 5]}, task=Stairs(), seed=1).converged
