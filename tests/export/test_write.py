@@ -86,6 +86,7 @@ def test_a_stale_or_missing_result_is_refused(project: Path) -> None:
 def test_other_folders_are_left_alone(project: Path) -> None:
     """A file, or a folder that holds something else, is refused, and nothing in it is touched."""
     out = project / "build" / "export"
+    out.parent.mkdir(exist_ok=True)
     out.write_text("years of work")
     with pytest.raises(UserError, match=r"is not a folder; choose another one$"):
         export(project)
