@@ -47,12 +47,21 @@ def interrupted(
 ) -> None:
     """Interrupt a run some seconds after its cell or driver has begun; check how it ends."""
     begin = f"from pathlib import Path\nPath({str(project / 'begun')!r}).touch()"
-    write_notebook(project / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(36_000)")
+    write_notebook(
+        project / "notebooks" / "sleep.ipynb", f"{begin}\nimport time\ntime.sleep(36_000)"
+    )
     (project / "environment.lock").touch()
     scratch = project / "scratch"
     scratch.mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(project), "run", str(project / "sleep.ipynb")],
+        [
+            sys.executable,
+            "-c",
+            PROGRAM,
+            str(project),
+            "run",
+            str(project / "notebooks" / "sleep.ipynb"),
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -110,11 +119,11 @@ def ended_early(project: Path, pause: float, number: int, *words: str) -> None:
 def importing(project: Path, *pauses: float) -> None:
     """Interrupt commands while they import; nothing is left."""
     begin = "import time\ntime.sleep(36_000)"
-    write_notebook(project / "sleep.ipynb", begin)
+    write_notebook(project / "notebooks" / "sleep.ipynb", begin)
     (project / "environment.lock").touch()
     for at, pause in enumerate(pauses):
         number = (signal.SIGINT, signal.SIGTERM)[at % 2]
-        ended_early(project, pause, number, "run", str(project / "sleep.ipynb"))
+        ended_early(project, pause, number, "run", str(project / "notebooks" / "sleep.ipynb"))
         ended_early(project, pause, number, "learn", SOCCER, "--out", str(project / "learn"))
     assert list((project / "learn").glob("*")) == []
 
