@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.bench_qlearning import ROUNDS, make_load, measure, show
 from replication.envs.gym import MazeEnv
-from replication.envs.moves import Moves
+from replication.envs.tasks.moves import Moves
 from replication.learning import chance, qlearning, stepped
 from replication.learning.seeds import stream
 

@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from replication.demos.checks import DemoError
     from replication.demos.csv import read_csv
     from replication.demos.files import check_demos, load_demos, save_demos
+    from replication.demos.lists import make_demos
     from replication.demos.maze_expert import demonstrate
     from replication.demos.minari import from_minari, to_minari
     from replication.demos.model import Demo, Demos
-    from replication.demos.tasks import make_demos
-    from replication.envs.bins import Bins
     from replication.envs.gym import MazeEnv
-    from replication.envs.gym_task import GymTask
     from replication.envs.maze import Maze, MazeError
-    from replication.envs.tabular import TabularTask
-    from replication.envs.task import Task, TaskError
-    from replication.envs.wrapped_task import WrappedTask
+    from replication.envs.tasks.base import Task, TaskError
+    from replication.envs.tasks.bins import Bins
+    from replication.envs.tasks.gymnasium import GymTask
+    from replication.envs.tasks.stepped import WrappedTask
+    from replication.envs.tasks.table import TabularTask
     from replication.files import stored
     from replication.fitting import fit, fit_many
     from replication.irl import METHODS
@@ -75,15 +75,15 @@ if not TYPE_CHECKING:  # a type checker would take it to know every name
         "demos.maze_expert": ("demonstrate",),
         "demos.minari": ("from_minari", "to_minari"),
         "demos.model": ("Demo", "Demos"),
-        "demos.tasks": ("make_demos",),
+        "demos.lists": ("make_demos",),
         "recording.terminal": ("record",),
-        "envs.bins": ("Bins",),
+        "envs.tasks.bins": ("Bins",),
         "envs.gym": ("MazeEnv",),
-        "envs.gym_task": ("GymTask",),
+        "envs.tasks.gymnasium": ("GymTask",),
         "envs.maze": ("Maze", "MazeError"),
-        "envs.tabular": ("TabularTask",),
-        "envs.task": ("Task", "TaskError"),
-        "envs.wrapped_task": ("WrappedTask",),
+        "envs.tasks.table": ("TabularTask",),
+        "envs.tasks.base": ("Task", "TaskError"),
+        "envs.tasks.stepped": ("WrappedTask",),
         "files": ("stored",),
         "fitting": ("fit", "fit_many"),
         "irl": ("METHODS",),

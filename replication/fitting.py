@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from replication.demos.checks import DemoWarning
 from replication.demos.files import doubts
+from replication.demos.lists import Trajectory, make_demos
 from replication.demos.model import Demos
-from replication.demos.tasks import Trajectory, make_demos
 from replication.envs.environment import Environment
-from replication.envs.task import Task
+from replication.envs.tasks.base import Task
 from replication.errors import clip, show
 from replication.irl import Method
 from replication.irl.expectations import norm

@@ -6,7 +6,7 @@ from typing import Any
 
 import gymnasium
 
-from replication.envs.wrapped_task import WrappedTask
+from replication.envs.tasks.stepped import WrappedTask
 from replication.errors import clip
 from replication.result import Fit, FitError
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from replication.demos.checks import DemoError
 from replication.demos.files import demos_document, doubts, parse_demos
+from replication.demos.lists import action_numbers
 from replication.demos.model import Demos
-from replication.demos.tasks import action_numbers
 from replication.envs.environment import Environment
-from replication.envs.task import Task
+from replication.envs.tasks.base import Task
 from replication.errors import UserError, clip
 from replication.files import FileError, read_json, write_file
 from replication.paper.params import Params

@@ -21,7 +21,7 @@ SILENT = frozenset(
     for name in (
         *("demos.checks", "errors", "irl.methods", "source", "trials.agents"),
         *("paper.params", "paper.register"),  # the values of parameters are part of the key
-        *("envs.task", "envs.moves"),  # of tasks whose trials are not stored
+        *("envs.tasks.base", "envs.tasks.moves"),  # of tasks whose trials are not stored
     )
 )
 """Modules that change no stored trial: they check, phrase messages, list what there is, or hash."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.envs.environment import Environment
-from replication.envs.task import Task, TaskError
+from replication.envs.tasks.base import Task, TaskError
 from replication.errors import UserError, compact, show, unknown
 
 

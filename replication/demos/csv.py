@@ -16,7 +16,7 @@ from replication.demos.checks import DemoError, check_moves
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
 from replication.envs.maze import Maze, MazeError
-from replication.envs.task import TaskError
+from replication.envs.tasks.base import TaskError
 from replication.errors import show, unknown
 from replication.files import printable, read_text
 

@@ -17,7 +17,7 @@ from replication.envs.environment import Environment
 from replication.envs.maze import MAX_SIDE, Maze, MazeError
 from replication.envs.soccer.field import SoccerField
 from replication.envs.soccer.rules import SoccerParams
-from replication.envs.task import Task, TaskError
+from replication.envs.tasks.base import Task, TaskError
 from replication.errors import compact, show
 
 OWN = "own"
@@ -115,7 +115,7 @@ class GymnasiumFields(
         """Make the environment; raises `DemoError` if Gymnasium cannot."""
         import gymnasium
 
-        from replication.envs.gym_task import GymTask
+        from replication.envs.tasks.gymnasium import GymTask
 
         if ":" in self.id:  # would import a module that the file names
             raise DemoError(

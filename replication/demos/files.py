@@ -20,7 +20,7 @@ from replication.demos.schema import (
 )
 from replication.demos.strict_json import layout, read_content
 from replication.envs.environment import Environment
-from replication.envs.task import Task
+from replication.envs.tasks.base import Task
 from replication.errors import compact, show
 from replication.files import printable, reason, write_file
 

@@ -18,7 +18,7 @@ from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.demos.schema import FORMAT, VERSION, read_fields
 from replication.envs.environment import Environment
-from replication.envs.task import Task
+from replication.envs.tasks.base import Task
 from replication.errors import UserError, need, show
 from replication.files import parse_json
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from replication.envs.moves import Moves
+from replication.envs.tasks.moves import Moves
 from replication.learning import arguments, compiled, qlearning
 from replication.source import source_hash
 

@@ -13,11 +13,11 @@ import numpy as np
 from replication.demos.checks import goal_phrase, no_op_phrase
 from replication.envs.environment import Environment
 from replication.envs.gym import MazeEnv
-from replication.envs.gym_task import GymTask
 from replication.envs.maze import Maze
-from replication.envs.tabular import TabularTask
-from replication.envs.task import Task
-from replication.envs.wrapped_task import WrappedTask
+from replication.envs.tasks.base import Task
+from replication.envs.tasks.gymnasium import GymTask
+from replication.envs.tasks.stepped import WrappedTask
+from replication.envs.tasks.table import TabularTask
 from replication.errors import UserError, clip
 
 AGENT, WAY, GOAL, WALL, PLAIN = "\x1b[1;31m", "\x1b[36m", "\x1b[1;32m", "\x1b[2m", "\x1b[0m"

@@ -15,7 +15,7 @@ from replication.demos.model import Demos
 from replication.envs.maze import Maze
 from replication.envs.soccer.field import SoccerField, as_soccer
 from replication.envs.soccer.replay import replay
-from replication.envs.task import Task
+from replication.envs.tasks.base import Task
 from replication.report.field import demonstrations as demonstrated
 from replication.report.field import draw_ways
 from replication.report.maze import (

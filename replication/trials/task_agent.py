@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.envs.environment import Environment
-from replication.envs.gym_task import GymTask
-from replication.envs.moves import Moves
-from replication.envs.task import Task, TaskError
+from replication.envs.tasks.base import Task, TaskError
+from replication.envs.tasks.gymnasium import GymTask
+from replication.envs.tasks.moves import Moves
 from replication.irl.agent import Agent, Episode
 from replication.learning import chance, planning, stepped
 from replication.paper.params import Params

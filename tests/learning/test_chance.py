@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from replication.envs.moves import Moves
+from replication.envs.tasks.moves import Moves
 from replication.learning import chance, chance_reference, planning, qlearning, reference
 from replication.learning.seeds import stream
 from replication.source import source_hash

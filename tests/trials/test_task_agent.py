@@ -10,7 +10,7 @@ import pytest
 
 from replication import Bins, GymTask, Maze, Params, TabularTask, Task, TaskError, WrappedTask, fit
 from replication.envs.gym import MazeEnv
-from replication.envs.task import Walk
+from replication.envs.tasks.base import Walk
 from replication.learning import reference
 from replication.learning.seeds import stream
 from replication.paper.register import ChoiceError

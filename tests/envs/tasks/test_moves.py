@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from replication.envs.moves import CERTAIN, Moves
+from replication.envs.tasks.moves import CERTAIN, Moves
 
 Array = NDArray[Any]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.envs.moves import Moves
+from replication.envs.tasks.moves import Moves
 from replication.errors import UserError, clip
 
 Ints = NDArray[np.int64]

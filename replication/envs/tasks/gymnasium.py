@@ -12,9 +12,9 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
-from replication.envs.tabular import TabularTask
-from replication.envs.task import Ints, Task, TaskError, Walk
-from replication.envs.wrapped_task import WrappedTask, env_name
+from replication.envs.tasks.base import Ints, Task, TaskError, Walk
+from replication.envs.tasks.stepped import WrappedTask, env_name
+from replication.envs.tasks.table import TabularTask
 from replication.errors import clip
 
 NAMES = {

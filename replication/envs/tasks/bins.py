@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replication.envs.task import TaskError
+from replication.envs.tasks.base import TaskError
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
-from replication.envs.task import TaskError
+from replication.envs.tasks.base import TaskError
 from replication.errors import UserError, clip, show
 
 Trajectory = Sequence[str | int] | tuple[Sequence[int], Sequence[str | int]]
@@ -43,7 +43,7 @@ def make_demos(
 
     Examples
     --------
-    >>> from replication.envs.tabular import TabularTask
+    >>> from replication.envs.tasks.table import TabularTask
     >>> task = TabularTask([[0, 1], [0, 2], [2, 2]], terminal=[2], actions=("back", "on"))
     >>> demos = make_demos(task, {"correct": [["on", "on"]], "dawdle": [["on", "back", "on"]]})
     >>> demos.correct[0].states.tolist(), demos.kinds

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from replication import DemoError, Demos, GymTask, Maze, TabularTask, load_demos, save_demos
-from replication.demos.tasks import make_demos
+from replication.demos.lists import make_demos
 
 CORRIDOR = TabularTask([[0, 1], [0, 2], [2, 2]], terminal=[2], actions=("back", "on"))
 COIN = TabularTask(np.array([[[0.5, 0.5]], [[0.0, 1.0]]]), terminal=[1])

@@ -10,8 +10,8 @@ from gymnasium.wrappers import TransformAction
 
 from replication import GymTask, TaskError
 from replication.envs.gym import MazeEnv
-from replication.envs.tabular import TabularTask
-from replication.envs.wrapped_task import WrappedTask
+from replication.envs.tasks.stepped import WrappedTask
+from replication.envs.tasks.table import TabularTask
 
 LAKE = ("left", "down", "right", "up")
 

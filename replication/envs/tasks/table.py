@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from replication.envs.moves import Moves
-from replication.envs.task import Ints, Task, TaskError, Walk, named_actions, out_of_range
+from replication.envs.tasks.base import Ints, Task, TaskError, Walk, named_actions, out_of_range
+from replication.envs.tasks.moves import Moves
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class TabularTask(Task):
     Attributes
     ----------
     table
-        All of it, see :class:`replication.envs.moves.Moves`.
+        All of it, see :class:`replication.envs.tasks.moves.Moves`.
 
     Raises
     ------

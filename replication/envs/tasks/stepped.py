@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import TransformAction
 
-from replication.envs.task import Ints, Task, TaskError, Walk, named_actions, out_of_range
+from replication.envs.tasks.base import Ints, Task, TaskError, Walk, named_actions, out_of_range
 from replication.errors import clip
 
 PROBES = (0, 1, 2)

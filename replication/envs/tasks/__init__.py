@@ -1,0 +1,1 @@
+"""Tasks of a user's own: tables, and Gymnasium environments with or without one."""
