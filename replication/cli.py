@@ -648,12 +648,14 @@ def _maze(file: Path) -> Any:
 @click.option("--map", "map_file", type=FILE, metavar="MAP", help="A maze, as for `demos make`.")
 @click.option("--env", metavar="ID", help="A Gymnasium environment; -p sets its options.")
 @click.option("--actions", metavar="NAMES", help="Names of its actions, joined by commas.")
+@number("--reset-seed", 0, "Start each of its episodes from this seed.")
 @parameters_option
 def record_demos(
     file: Path,
     map_file: Path | None,
     env: str | None,
     actions: str | None,
+    reset_seed: int | None,
     parameters: dict[str, Any],
 ) -> None:
     """Demonstrate by keys in this terminal.
@@ -668,14 +670,15 @@ def record_demos(
     _catch_signals()
     if (map_file and env) or not (map_file or env or file.exists()):
         raise UserError("say where to record: --map MAP, --env ID, or a FILE that is there")
-    if (parameters or actions) and not env:
-        raise UserError("-p and --actions are for --env")
+    if (parameters or actions or reset_seed is not None) and not env:
+        raise UserError("-p, --actions and --reset-seed are for --env")
     with _plain_warnings():
         if env:
             names = actions.split(",") if actions else None
-            fields = GymnasiumFields(kind="gymnasium", id=env, options=parameters, actions=names)
+            more: dict[str, Any] = {"options": parameters, "reset_seed": reset_seed}
+            fields = GymnasiumFields(kind="gymnasium", id=env, actions=names, **more)
             task: Any = fields.build()
-            world = task if actions else task.env
+            world = task if actions or reset_seed is not None else task.env
         else:
             world = _maze(map_file) if map_file else load_demos(file).environment
         try:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.demos.checks import DemoError
+from replication.demos.checks import DemoError, action_number
 from replication.demos.files import demos_document, doubts, parse_demos
-from replication.demos.lists import action_numbers
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
 from replication.envs.tasks.base import Task
@@ -126,7 +125,12 @@ class Fit:
         lines += [f"note        {doubt}" for doubt in doubts(demos)]
         path = [",".join(map(str, cell)) for cell, _ in self.path]
         shown = path if len(path) <= 12 else [*path[:8], "...", *path[-3:]]
-        return "\n".join([*lines, f"path        {' '.join(shown)} ({len(self.actions)} steps)"])
+        return "\n".join(
+            [
+                *lines,
+                f"path        {' '.join(shown)} ({len(self.actions)} step{'s' * (len(self.actions) != 1)})",
+            ]
+        )
 
     def policy(self) -> NDArray[np.int64]:
         """Return the greedy action of each state, int64 [state]."""
@@ -142,7 +146,7 @@ class Fit:
 
     def reward(self, state: Any, action: str | int) -> float:
         """Return the learned reward R(s, a); state and errors as for `predict`."""
-        (number,) = action_numbers(self.demos.environment, [action])
+        number = action_number(self.demos.environment, action)
         return float(self.weights[self._state(state), number])
 
     def plot(self) -> Figure:

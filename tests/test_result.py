@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from replication import (
+    DemoError,
     Demos,
     Fit,
     GymTask,
     Params,
     TabularTask,
-    TaskError,
     WrappedTask,
     fit,
 )
@@ -106,7 +106,7 @@ def test_unseen_states_are_one_line(corridor: Fit, state: Any) -> None:
     for ask in (corridor.predict, lambda state: corridor.reward(state, "on")):
         with pytest.raises(UserError, match=r"there is no state .*; states are 0\.\.2$"):
             ask(state)
-    with pytest.raises(TaskError, match="there is no action 'away'"):
+    with pytest.raises(DemoError, match="unknown action 'away'"):
         corridor.reward(0, "away")
 
 

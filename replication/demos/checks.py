@@ -6,7 +6,8 @@ Steps count from 1: step k takes ``actions[k - 1]`` and leads to ``states[k]``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,22 +25,41 @@ class DemoWarning(UserWarning):
     """Demonstrations that can be used, but which no deterministic policy can match exactly."""
 
 
+def action_number(environment: Environment, action: str | int) -> int:
+    """Return the number of an action: of a text that names one, or of a number that is one.
+
+    Raises
+    ------
+    DemoError
+        If the environment does not know the action.
+    """
+    if isinstance(action, str) and action in environment.actions:
+        return environment.actions.index(action)
+    is_number = isinstance(action, Integral) and not isinstance(action, bool)
+    if is_number and 0 <= int(action) < environment.n_actions:
+        return int(action)
+    shown = action if isinstance(action, str) else repr(action)
+    last = environment.n_actions - 1
+    raise DemoError(f"{unknown(shown, environment.actions, 'action')} (or a number, 0 to {last})")
+
+
 def action_numbers(
-    environment: Environment, name: str, actions: Sequence[str]
+    environment: Environment, name: str, actions: Iterable[str | int]
 ) -> NDArray[np.int64]:
-    """Return the numbers of named actions, int64 [T].
+    """Return the numbers of actions that a demonstration takes, int64 [T].
 
     Raises
     ------
     DemoError
         If the environment does not know an action of the demonstration `name`.
     """
-    numbers = {action: number for number, action in enumerate(environment.actions)}
+    numbers = []
     for step, action in enumerate(actions, start=1):
-        if action not in numbers:
-            message = unknown(action, numbers, "action")
-            raise DemoError(f"step {step} of demo {show(name)}: {message}")
-    return np.array([numbers[action] for action in actions], dtype=np.int64)
+        try:
+            numbers.append(action_number(environment, action))
+        except DemoError as error:
+            raise DemoError(f"step {step} of demo {show(name)}: {error}") from None
+    return np.array(numbers, dtype=np.int64)
 
 
 def replay(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.demos.checks import DemoError, check_moves
+from replication.demos.checks import DemoError, action_number, check_moves
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
 from replication.envs.maze import Maze, MazeError
@@ -135,7 +135,9 @@ def _add(
     episode.steps.append(step)
     episode.states.append(_state(row, environment))
     if row["action"]:
-        episode.actions.append(_action(row["action"], environment))
+        text = row["action"]
+        action = int(text) if text.isdecimal() and text not in environment.actions else text
+        episode.actions.append(action_number(environment, action))
 
 
 def _state(row: dict[str, str], environment: Environment) -> int:
@@ -149,16 +151,6 @@ def _state(row: dict[str, str], environment: Environment) -> int:
         last = environment.n_states - 1
         raise DemoError(f"there is no state {state}; states are 0..{last}")
     return state
-
-
-def _action(text: str, environment: Environment) -> int:
-    if text in environment.actions:
-        return environment.actions.index(text)
-    if text.isdecimal() and int(text) < environment.n_actions:
-        return int(text)
-    names = ", ".join(environment.actions)
-    last = environment.n_actions - 1
-    raise DemoError(f"there is no action {show(text)}; use {names}, or 0..{last}")
 
 
 def _number(text: str, what: str) -> int:

@@ -119,13 +119,15 @@ class GymnasiumFields(
 
         if ":" in self.id:  # would import a module that the file names
             raise DemoError(
-                f"environment.id: {show(self.id)} names a module; import it in Python and give the "
-                "task itself: load_demos(path, task=...)"
+                f"environment.id: {show(self.id)} names a module; import it in Python, and use "
+                "record(task, path) or load_demos(path, task=...)"
             )
         try:
             env = gymnasium.make(self.id, **self.options)
             return GymTask(env, actions=self.actions, reset_seed=self.reset_seed)
-        except (gymnasium.error.Error, TaskError, TypeError, ValueError, KeyError) as error:
+        except TaskError as error:
+            raise DemoError(f"environment: {error}") from None
+        except (gymnasium.error.Error, TypeError, ValueError, KeyError) as error:
             first = str(error).splitlines()[0] if str(error) else repr(error)
             raise DemoError(f"environment: Gymnasium cannot make it: {first}") from None
 

@@ -68,8 +68,12 @@ def parse_demos(content: bytes, task: Environment | None = None) -> Demos:
     fields = read_fields(content)
     environment = fields.environment.build() if task is None else task
     written = fields.environment.model_dump(exclude_none=True)
-    if task is not None and not written.items() <= task.describe().items():
-        raise DemoError("environment: the file was made in another one than the task that is given")
+    for field, value in written.items() if task is not None else ():
+        if environment.describe().get(field) != value:
+            raise DemoError(
+                f"environment: the file was made in another one than the task that is given: its "
+                f"{field!r} is {show(value)}"
+            )
     return Demos(
         task=fields.task,
         environment=environment,

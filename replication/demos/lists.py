@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from replication.demos.checks import DemoError
+from replication.demos.checks import DemoError, action_numbers
 from replication.demos.model import Demo, Demos
 from replication.envs.environment import Environment
 from replication.envs.tasks.base import TaskError
-from replication.errors import UserError, clip, show
+from replication.errors import UserError, show
 
 Trajectory = Sequence[str | int] | tuple[Sequence[int], Sequence[str | int]]
 """Actions by name or number; or the states [T + 1], by number, and the actions [T]."""
@@ -71,8 +71,10 @@ def _demo(environment: Environment, kind: str, name: str, way: Trajectory) -> De
     try:
         if len(way) == 2 and not isinstance(way[0], str) and isinstance(way[0], Iterable):
             states, actions = way
-        numbers = action_numbers(environment, actions)
+        numbers = action_numbers(environment, name, actions)
         states = environment.replay(numbers) if states is None else _whole(states)
+    except DemoError:
+        raise
     except UserError as error:
         raise DemoError(f"demo {show(name)}: {error}") from None
     except (TypeError, ValueError) as error:
@@ -81,28 +83,6 @@ def _demo(environment: Environment, kind: str, name: str, way: Trajectory) -> De
             f"({error})"
         ) from None
     return Demo(name, kind, states, numbers)
-
-
-def action_numbers(environment: Environment, actions: Iterable[str | int]) -> Any:
-    """Return the numbers of actions that are named or numbered, int64 [T].
-
-    Raises
-    ------
-    TaskError
-        If there is no such action.
-    """
-    known: dict[str | int, int] = {number: number for number in range(environment.n_actions)}
-    known |= {name: number for number, name in enumerate(environment.actions)}
-    found = []
-    for step, action in enumerate(actions, start=1):
-        if isinstance(action, bool) or action not in known:
-            names = ", ".join(environment.actions)
-            raise TaskError(
-                f"step {step}: there is no action {clip(repr(action))}; use {names}, or numbers "
-                f"from 0 to {environment.n_actions - 1}"
-            )
-        found.append(known[action])
-    return np.array(found, np.int64)
 
 
 def _whole(states: Any) -> Any:

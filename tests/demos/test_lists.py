@@ -49,7 +49,7 @@ def test_mazes_take_lists_as_well() -> None:
 @pytest.mark.parametrize(
     ("ways", "message"),
     [
-        ({"correct": [["on", "away"]]}, "demo 'correct-1': step 2: there is no action 'away'; use"),
+        ({"correct": [["on", "away"]]}, "step 2 of demo 'correct-1': unknown action 'away'"),
         ({"correct": [["on", "on", "on"]]}, "demo 'correct-1': it goes on after the episode"),
         ({"correct": [([0, 2], ["on"])]}, "demo 'correct-1': step 1: 'on' in state 0 leads to 1"),
         ({"correct": [7]}, r"demo 'correct-1' must be a list of actions, or a pair"),
@@ -103,7 +103,7 @@ def test_own_demonstrations_come_back_with_their_task(tmp_path: Path) -> None:
         ('{"kind": "gymnasium", "id": "os:Lake-v1"}', "environment.id: 'os:Lake-v1' names a mod"),
         ('{"kind": "gymnasium", "id": "Lake-v1"}', "environment: Gymnasium cannot make it: "),
         ('{"kind": "gymnasium", "id": "FrozenLake-v1", "options": {"x": 1}}', "Gymnasium cannot"),
-        ('{"kind": "gymnasium", "id": "CartPole-v1"}', "cannot make it: CartPole-v1: observations"),
+        ('{"kind": "gymnasium", "id": "CartPole-v1"}', "environment: CartPole-v1: observations"),
         ('{"kind": "gymnasium"}', "environment: the field 'id' is missing; add it"),
         ('{"kind": "own", "states": 0, "actions": []}', "environment.states: 0 does not fit"),
     ],
