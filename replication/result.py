@@ -125,12 +125,8 @@ class Fit:
         lines += [f"note        {doubt}" for doubt in doubts(demos)]
         path = [",".join(map(str, cell)) for cell, _ in self.path]
         shown = path if len(path) <= 12 else [*path[:8], "...", *path[-3:]]
-        return "\n".join(
-            [
-                *lines,
-                f"path        {' '.join(shown)} ({len(self.actions)} step{'s' * (len(self.actions) != 1)})",
-            ]
-        )
+        steps = f"{len(self.actions)} step{'s' * (len(self.actions) != 1)}"
+        return "\n".join([*lines, f"path        {' '.join(shown)} ({steps})"])
 
     def policy(self) -> NDArray[np.int64]:
         """Return the greedy action of each state, int64 [state]."""
