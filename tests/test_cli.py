@@ -598,7 +598,9 @@ def test_record_refuses_in_one_line(tmp_path: Path) -> None:
     assert "needs a terminal; elsewhere" in refused(*record, "--map", drawn)
     assert "say where to record: --map MAP, --env ID" in refused(*record)
     assert "say where to record" in refused(*record, "--map", drawn, "--env", "FrozenLake-v1")
-    assert "-p and --actions are for --env" in refused(*record, "--map", drawn, "-p", "a", "1")
+    assert "-p, --actions and --reset-seed are for --env" in refused(
+        *record, "--map", drawn, "-p", "a", "1"
+    )
     lake = (*record, "--env", "FrozenLake-v1")
     assert "unexpected keyword argument 'slippery'" in refused(*lake, "-p", "slippery", "true")
     assert "names 2 actions; the environment has 4" in refused(*lake, "--actions", "left,right")
