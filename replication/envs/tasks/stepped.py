@@ -93,6 +93,8 @@ class WrappedTask(Task):
     def number(self, observation: Any) -> int:
         """Return the number of an observation's state; raises `TaskError` if it is none."""
         found = self.state(observation)
+        if type(found) is int and 0 <= found < self.n_states:  # a learner asks at every step
+            return found
         try:
             number = operator.index(found)
         except TypeError:
