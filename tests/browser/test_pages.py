@@ -30,7 +30,8 @@ NARROW, WIDE = {"width": 390, "height": 844}, {"width": 1600, "height": 1000}
 PLAYERS = ("notebooks/open_maze", "notebooks/obstacle_maze", "notebooks/soccer")
 READ = (
     *("index", "findings", "claims", "choices", "trust", "methods"),
-    *("running", "demonstrations", "architecture", "api/index", "cite"),
+    *("running", "demonstrations", "task", "gymnasium", "record", "reward"),
+    *("architecture", "api/index", "cite"),
     *PLAYERS,
     *("notebooks/method", "notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
     *("notebooks/rounding", "round_1"),
