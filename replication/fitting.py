@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.demos.checks import DemoWarning
-from replication.demos.files import doubts
+from replication.demos.files import different_ways, doubts
 from replication.demos.lists import Trajectory, make_demos
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
-from replication.envs.tasks.base import Task
+from replication.envs.tasks.base import is_over, is_random
 from replication.errors import clip, show
 from replication.irl import Method
 from replication.irl.expectations import norm
@@ -191,15 +191,14 @@ def own_params(demos: Demos, **values: Any) -> Params:
     after `PLATEAU` iterations without a smaller error. The horizon is that of the environment, if
     it has one that is shorter. All else is as in the register.
     """
-    is_random = isinstance(demos.environment, Task) and demos.environment.is_random
-    ways = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
+    random = is_random(demos.environment)
     limit = getattr(getattr(getattr(demos.environment, "env", None), "spec", None), LIMIT, None)
     usual = Params().learner.horizon
     suited = {
         "incorrect": "all",
         "horizon": min(usual, limit or usual),
-        "rollouts": ROLLOUTS if is_random else 1,
-        "plateau": PLATEAU if is_random or len(ways) > 1 else 0,
+        "rollouts": ROLLOUTS if random else 1,
+        "plateau": PLATEAU if random or different_ways(demos) > 1 else 0,
     }
     return Params.of(**suited | values)
 
@@ -235,8 +234,7 @@ def _open_ends(result: Fit) -> list[str]:
         steps = len(demo.actions)
         if steps > horizon:
             return [f"correct demo {show(demo.name)} has {steps} steps, but horizon = {horizon}"]
-        open_end = isinstance(task, Task) and task.is_over(demo.states, demo.actions) is False
-        if open_end and steps < horizon:
+        if steps < horizon and is_over(task, demo.states, demo.actions) is False:
             return [
                 f"correct demo {show(demo.name)} stops after {steps} steps, but the episode goes "
                 f"on: the agent drives on to the horizon, so set horizon = {steps}"

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium
 
+from replication.demos.checks import action_number
 from replication.envs.tasks.stepped import WrappedTask
 from replication.errors import clip
 from replication.result import Fit, FitError
@@ -29,6 +30,8 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     Notes
     -----
+    Where no trajectory has ever been the reward is 0: nothing was learned there.
+
     The reward says what the demonstrations say with the discount of `result.params`: train with the
     same one.
 
@@ -68,6 +71,8 @@ class LearnedReward(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take an action; raises `UserError` if the state is not one of the task."""
-        reward = self.result.reward(self._observation, int(action) - self._first)
+        state = self.result.number(self._observation)
+        number = action_number(self.result.demos.environment, int(action) - self._first)
+        reward = self.result.weights.item(state, number)
         self._observation, _, ended, cut, info = self.env.step(action)
         return self._observation, reward, ended, cut, info

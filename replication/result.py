@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.demos.checks import DemoError, action_number
-from replication.demos.files import demos_document, doubts, parse_demos
+from replication.demos.files import demos_document, doubts, parse_demos, summary
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
 from replication.envs.tasks.base import Task
@@ -75,7 +75,7 @@ class Fit:
 
     def __repr__(self) -> str:
         ended = "converged" if self.converged else "not converged"
-        return f"<Fit of {self.demos.task!r} by {self.method}: {ended} after {self._number}>"
+        return f"<Fit of {self.demos.task!r} by {self.method}: {ended} after {self._count}>"
 
     @property
     def iterations(self) -> int:
@@ -111,13 +111,12 @@ class Fit:
             "cap": f"not converged: ended at the cap of {loop.max_iterations} iterations",
         }
         chosen = [f"{id}={value}" for id, value in self.params.differences().items()]
-        kinds = [f"{sum(d.kind == kind for d in demos.incorrect)} {kind}" for kind in demos.kinds]
         lines = [
             f"task        {demos.task}: {demos.environment.n_states} states, "
             f"{demos.environment.n_actions} actions",
-            f"demos       {', '.join([f'{len(demos.correct)} correct', *kinds])}",
+            f"demos       {summary(demos)}",
             " ".join(["method      " + self.method, f"seed {self.seed}", *chosen]),
-            f"result      {why[self.stopped]}; {self._number}, d = {self.error:.4g}",
+            f"result      {why[self.stopped]}; {self._count}, d = {self.error:.4g}",
         ]
         if not self.converged and loop.plateau:
             nearest = int(self.errors.argmin())
@@ -138,12 +137,20 @@ class Fit:
         `state` is what the environment shows: an observation of Gymnasium; else the number of a
         state or, in a maze, row and column. Raises `UserError` if there is none such.
         """
-        return self.demos.environment.actions[int(self.q[self._state(state)].argmax())]
+        return self.demos.environment.actions[int(self.q[self.number(state)].argmax())]
 
     def reward(self, state: Any, action: str | int) -> float:
-        """Return the learned reward R(s, a); state and errors as for `predict`."""
-        number = action_number(self.demos.environment, action)
-        return float(self.weights[self._state(state), number])
+        """Return the learned reward R(s, a); state and errors as for `predict`.
+
+        A state in which no trajectory has ever been has none.
+        """
+        number, at = action_number(self.demos.environment, action), self.number(state)
+        if not self.weights[at].any():
+            raise FitError(
+                f"state {at} has no reward: neither a demonstration nor a trajectory of the agent "
+                "was ever there; `weights` have 0"
+            )
+        return float(self.weights[at, number])
 
     def plot(self) -> Figure:
         """Return a figure of what was learned."""
@@ -152,11 +159,11 @@ class Fit:
         return fit_figure(self.demos, self.states, self.actions, self.weights, self.errors)
 
     @property
-    def _number(self) -> str:
+    def _count(self) -> str:
         return f"{self.iterations} iteration{'s' * (self.iterations != 1)}"
 
-    def _state(self, seen: Any) -> int:
-        """Return the number of a state."""
+    def number(self, seen: Any) -> int:
+        """Return the number of a state, which is given as for `predict`."""
         environment = self.demos.environment
         if isinstance(environment, Task):
             return environment.number(seen)

@@ -31,6 +31,18 @@ def test_rewards_are_those_of_the_pairs_that_are_passed() -> None:
     assert ended
 
 
+def test_states_that_nobody_saw_are_worth_nothing() -> None:
+    """Another learner may go where no trajectory was; there the reward is 0."""
+    result = fit({"correct": [ACROSS]}, task=GymTask(lake()), seed=1)
+    unseen = np.flatnonzero(~result.weights.any(axis=1)).tolist()
+    env = lake()
+    learned = LearnedReward(env, result)
+    learned.reset(seed=1)
+    assert 3 in unseen
+    learned._observation = 3
+    assert learned.step(0)[1] == 0
+
+
 def test_another_learner_learns_the_way_from_the_reward() -> None:
     """Ten lines of Q-learning that know nothing of demonstrations find the expert's way."""
     result = fit({"correct": [ACROSS]}, task=GymTask(lake()), seed=1)

@@ -94,10 +94,17 @@ def test_predictions_are_the_greedy_policy(fitted: Fit) -> None:
 
 def test_rewards_are_the_weights(corridor: Fit) -> None:
     """A reward is that of a state and an action, by name or number."""
-    for state in range(3):
+    for state in range(2):
         for number, name in enumerate(("back", "on")):
             due = corridor.weights[state, number]
             assert corridor.reward(state, name) == corridor.reward(state, number) == due
+
+
+def test_where_nobody_was_there_is_no_reward(corridor: Fit) -> None:
+    """A state that neither a demonstration nor the agent left is refused, not rewarded by 0."""
+    with pytest.raises(FitError, match=r"^state 2 has no reward: .* was ever there"):
+        corridor.reward(2, "on")
+    assert corridor.predict(2) in ("back", "on")
 
 
 @pytest.mark.parametrize("state", [3, -1, "1", 0.5, (1, 2), None])

@@ -20,7 +20,7 @@ from replication.demos.schema import (
 )
 from replication.demos.strict_json import layout, read_content
 from replication.envs.environment import Environment
-from replication.envs.tasks.base import Task
+from replication.envs.tasks.base import is_random
 from replication.errors import compact, show
 from replication.files import printable, reason, write_file
 
@@ -152,22 +152,28 @@ def doubts(demos: Demos) -> list[str]:
             f"the correct demos take {actions} in {compact(demos.environment.cell(state))}"
             f" (one of {len(conflicts)} such states): d = 0 cannot be reached"
         )
-    paths = {(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct}
-    is_random = isinstance(demos.environment, Task) and demos.environment.is_random
-    if len(paths) > 1 and not is_random:
+    ways = different_ways(demos)
+    if ways > 1 and not is_random(demos.environment):
         messages.append(
-            f"the correct demos are {len(paths)} different trajectories: mu_E is their average, "
+            f"the correct demos are {ways} different trajectories: mu_E is their average, "
             "which a single deterministic trajectory cannot match"
         )
     right = state_action_pairs(*demos.correct)
     idle = [demo for demo in demos.incorrect if state_action_pairs(demo) <= right]
-    shown = f"incorrect demo {show(idle[0].name)} has" if len(idle) == 1 else ""
-    shown = shown or f"{len(idle)} incorrect demos ({show(idle[0].name)}, ...) have" if idle else ""
     if idle:
+        first, more = show(idle[0].name), len(idle) > 1
+        which = f"{len(idle)} incorrect demos ({first}, ...)" if more else f"incorrect demo {first}"
+        verb, whose = ("have", "their") if more else ("has", "its")
         messages.append(
-            f"{shown} no effect: all their pairs of state and action occur in a correct demo, too"
+            f"{which} {verb} no effect: all {whose} pairs of state and action occur in a correct "
+            "demo, too"
         )
     return messages
+
+
+def different_ways(demos: Demos) -> int:
+    """Return how many different trajectories the correct demos are."""
+    return len({(demo.states.tobytes(), demo.actions.tobytes()) for demo in demos.correct})
 
 
 def _read(path: str | os.PathLike[str], task: Environment | None = None) -> Demos:

@@ -18,7 +18,7 @@ from replication.demos.checks import DemoError
 from replication.demos.model import Demo, Demos
 from replication.demos.schema import FORMAT, VERSION, read_fields
 from replication.envs.environment import Environment
-from replication.envs.tasks.base import Task
+from replication.envs.tasks.base import is_over
 from replication.errors import UserError, need, show
 from replication.files import parse_json
 
@@ -56,7 +56,7 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
     for number, demo in enumerate(all_demos):
         ended = np.zeros(len(demo.actions), dtype=bool)
         over = ended.copy()
-        ended[-1] = _is_over(environment, demo)
+        ended[-1] = bool(is_over(environment, demo.states, demo.actions))
         over[-1] = not ended[-1]
         episode = EpisodeBuffer(
             id=number,
@@ -96,13 +96,6 @@ def to_minari(demos: Demos, dataset_id: str) -> MinariDataset:
             raise UserError(f"dataset {show(dataset_id)}: {_line(error)}") from None
         raise
     return dataset
-
-
-def _is_over(environment: Environment, demo: Demo) -> bool:
-    """Return whether an episode ended by itself, as far as that is known."""
-    if isinstance(environment, Task):
-        return bool(environment.is_over(demo.states, demo.actions))
-    return environment.goal_step(demo.actions) is not None
 
 
 def from_minari(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Environment(Protocol):
-    """A deterministic world with a start, a goal, and a finite number of states and actions."""
+    """A world with a finite number of states and actions."""
 
     @property
     def kind(self) -> str:

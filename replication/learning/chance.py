@@ -37,7 +37,7 @@ def learn(
     tolerance: float = 0.0,
     random_ties: bool = True,
 ) -> tuple[Floats, Words, int, int]:
-    """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
+    """Learn Q as :func:`replication.learning.qlearning.learn` does, which has the same results.
 
     Parameters
     ----------
@@ -46,14 +46,8 @@ def learn(
         of its starts and ends on reaching a state that ends it, which is worth 0 whatever its row
         of Q says.
     weights, q, stream, episodes, horizon, beta, gamma, epsilon, tolerance, random_ties
-        See :func:`replication.learning.qlearning.learn`. A step takes one draw for the action, and
-        one more if the move has several outcomes; an episode takes one if there are several starts.
-
-    Returns
-    -------
-    q, stream, steps, collisions
-        The new Q, the stream after the last draw, the number of steps taken, and that of steps
-        that ended where they began.
+        As there. A step takes one draw for the action, and one more if the move has several
+        outcomes; an episode takes one if there are several starts.
 
     Raises
     ------

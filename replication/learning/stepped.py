@@ -50,7 +50,7 @@ def learn(
     tolerance: float = 0.0,
     random_ties: bool = True,
 ) -> tuple[Floats, Words, int, int]:
-    """Learn Q by epsilon-greedy Q-learning (Eq. 1) on the reward ``weights``.
+    """Learn Q as :func:`replication.learning.qlearning.learn` does, which has the same results.
 
     Parameters
     ----------
@@ -59,13 +59,7 @@ def learn(
     state_of
         Returns the state of an observation.
     weights, q, stream, episodes, horizon, beta, gamma, epsilon, tolerance, random_ties
-        See :func:`replication.learning.qlearning.learn`.
-
-    Returns
-    -------
-    q, stream, steps, collisions
-        The new Q, the stream after the last draw, the number of steps taken, and that of steps
-        that ended in the state where they began.
+        As there.
 
     Raises
     ------

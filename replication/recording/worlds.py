@@ -14,7 +14,7 @@ from replication.demos.checks import goal_phrase, no_op_phrase
 from replication.envs.environment import Environment
 from replication.envs.gym import MazeEnv
 from replication.envs.maze import Maze
-from replication.envs.tasks.base import Task
+from replication.envs.tasks.base import is_over
 from replication.envs.tasks.gymnasium import GymTask
 from replication.envs.tasks.stepped import WrappedTask
 from replication.envs.tasks.table import TabularTask
@@ -97,22 +97,15 @@ class _Known:
     environment: Environment
 
     def play(self, actions: Sequence[int], attempt: int) -> Scene:
-        states = tuple(self.environment.replay(actions).tolist())
-        over = _ended(self.environment, actions)
+        states = self.environment.replay(actions)
+        over = bool(is_over(self.environment, states, np.array(actions, np.int64)))
         stays = len(states) > 1 and states[-1] == states[-2]
-        return Scene(states, _told(self.environment, over=over, stays=stays), over)
+        return Scene(tuple(states.tolist()), _told(self.environment, over=over, stays=stays), over)
 
     def draw(self, actions: Sequence[int], scene: Scene, columns: int, lines: int) -> list[str]:
         if isinstance(self.environment, Maze):
             return _drawn(self.environment, actions, scene.states, columns, lines)
         return []
-
-
-def _ended(environment: Environment, actions: Sequence[int]) -> bool:
-    """Return whether the episode is over; a task's end need not be its goal."""
-    if isinstance(environment, Task):
-        return environment.walk(actions).end is not None
-    return environment.goal_step(actions) is not None
 
 
 def _told(environment: Environment, *, over: bool, stays: bool) -> str:

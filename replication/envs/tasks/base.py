@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replication.envs.environment import Environment
 from replication.envs.tasks.moves import Moves
 from replication.errors import UserError, clip
 
@@ -117,6 +118,18 @@ class Task(ABC):
     def cells(self, states: Ints) -> Ints:
         """Return the numbers by which files refer to states, int64 [n, 1]."""
         return np.asarray(states, np.int64)[:, None]
+
+
+def is_random(environment: Environment) -> bool:
+    """Return whether the same actions may lead to different states; in a maze they do not."""
+    return isinstance(environment, Task) and environment.is_random
+
+
+def is_over(environment: Environment, states: Ints, actions: Ints) -> bool | None:
+    """Return whether an episode has ended with these states; None if that cannot be known."""
+    if isinstance(environment, Task):
+        return environment.is_over(states, actions)
+    return environment.goal_step(actions) is not None
 
 
 def named_actions(actions: Sequence[str] | None, n_actions: int) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import operator
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -96,16 +95,13 @@ class WrappedTask(Task):
         if type(found) is int and 0 <= found < self.n_states:  # a learner asks at every step
             return found
         try:
-            number = operator.index(found)
-        except TypeError:
-            number = -1
-        if not 0 <= number < self.n_states:
+            return super().number(found)
+        except TaskError:
             shown = clip(str(observation).replace("\n", " "))
             raise TaskError(
                 f"{self.name}: the state of observation {shown} is {found!r}; it must be a "
                 f"whole number from 0 to {self.n_states - 1}"
-            )
-        return number
+            ) from None
 
     def walk(self, actions: Sequence[int]) -> Walk:
         """Return where actions lead; raises `TaskError` if they lead elsewhere another time."""
