@@ -4,7 +4,7 @@ from pathlib import Path
 
 from sphinx.ext import autosummary
 
-from replication.site.extension import source_of
+from replication.site.reference import source_of
 
 project = "Unified IRL, replicated"
 copyright = "the replication authors, MIT licence"
@@ -34,6 +34,9 @@ linkcode_resolve = source_of  # a page of coloured code for each module would we
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {
+    name: name for name in ("Array", "Floats", "Ints", "Stream", "Words", "Value", "Entity")
+}  # written out, an array takes a line of each signature
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 add_module_names = False
@@ -63,3 +66,4 @@ html_copy_source = False
 html_show_sourcelink = False
 html_last_updated_fmt = None
 html_show_sphinx = False
+html_domain_indices = False  # the reference lists the modules itself

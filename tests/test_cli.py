@@ -180,7 +180,8 @@ def test_run_refuses_in_one_line(project: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["run"], ["draw"], ["status"], ["verify"], ["copy", "toy"], ["clean"], ["site"]]
+    "words",
+    [["run"], ["draw"], ["status"], ["verify"], ["copy", "toy"], ["clean"], ["site"], ["export"]],
 )
 def test_what_needs_a_clone_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]

@@ -131,7 +131,7 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
     for path in sorted(out.glob("[!.]*/[!.]*")):
         name = f"figures/{path.relative_to(out).as_posix()}"
         if packed(path):
-            yield f"{name}.xz", lzma.compress(read_file(path), preset=9)
+            yield f"{name}.xz", lzma.compress(read_file(path), preset=9 | lzma.PRESET_EXTREME)
         elif path.suffix != ".ipynb":
             yield name, read_file(path)
     captions = tomllib.loads(read_text(docs / "captions.toml"))

@@ -6,7 +6,6 @@ import html
 import json
 import re
 import textwrap
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -19,8 +18,8 @@ from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 from sphinx.writers.html5 import HTML5Translator
 
-from replication import files
-from replication.files import read_file, write_file
+from replication.files import write_file
+from replication.site import reference
 
 NUMBER = re.compile(r"[×≥~<]?\s*([-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)")
 TOGETHER = re.compile(r"\[[^\]]*\]|[×≥~<] (?=\d)")
@@ -35,41 +34,8 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.connect("html-page-context", _finish, priority=900)
     app.connect("build-finished", _write_texts)
-    app.connect("build-finished", _write_code)
-    app.connect("autodoc-skip-member", _skip_fields)
+    reference.connect(app)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
-
-
-def _skip_fields(
-    app: Sphinx, what: str, name: str, value: object, skip: bool, options: object
-) -> bool | None:
-    """Leave out the fields of named tuples, which their docstrings describe."""
-    return True if type(value).__name__ == "_tuplegetter" else None
-
-
-CODE = "code/"
-"""Where the package's code lies in the site."""
-
-
-# --- code ------------------------------------------------------------------------------------
-
-
-def source_of(domain: str, info: Mapping[str, str]) -> str | None:
-    """Return the address of an object's code, as the first page sees it."""
-    module = files.PROJECT / info["module"].replace(".", "/")
-    path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
-    if domain != "py" or not path.exists():
-        return None
-    name = info["fullname"].rpartition(".")[2]
-    at = f"text=def%20{quote(name)}&text=class%20{quote(name)}"  # browsers scroll to the first
-    return f"{CODE}{path.relative_to(files.PROJECT).as_posix()}.txt#:~:{at}"
-
-
-def _write_code(app: Sphinx, error: Exception | None) -> None:
-    """Write the package's code beside the pages, as text that a browser shows."""
-    for path in files.PROJECT.glob("replication/**/*.py"):
-        name = path.relative_to(files.PROJECT).as_posix()
-        write_file(Path(app.outdir) / "code" / f"{name}.txt", read_file(path))
 
 
 # --- formulas --------------------------------------------------------------------------------
@@ -109,7 +75,8 @@ def _finish(
     """Improve the tables of a page, and say what it shows to those who get a link to it."""
     if doctree is None:
         return
-    body = context["body"].replace(f'href="{CODE}', f'href="{context["content_root"]}{CODE}')
+    code = f'href="{reference.CODE}'
+    body = context["body"].replace(code, f'href="{context["content_root"]}{reference.CODE}')
     context["body"] = improve_tables(body) if "<table" in body else body
     texts = (paragraph.astext() for paragraph in doctree.findall(nodes.paragraph))
     first = next((text for text in texts if len(text) > 40), context.get("title", ""))

@@ -167,6 +167,21 @@ def test_names_that_minari_refuses_are_one_line(small_demos: Demos, folder: Path
     ]
 
 
+def test_half_a_dataset_is_not_kept(
+    small_demos: Demos, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the kinds of mistakes cannot be written, no dataset is left without them."""
+
+    def fail(*_: Any) -> None:
+        raise OSError("no space left")
+
+    storage = "minari.dataset._storages.hdf5_storage.HDF5Storage"
+    monkeypatch.setattr(f"{storage}.update_episode_metadata", fail)
+    with pytest.raises(UserError, match="no space left"):
+        to_minari(small_demos, "test/demos-v0")
+    assert not minari.list_local_datasets()
+
+
 def test_without_minari_one_line_says_how_to_install_it() -> None:
     """The package works without the extra, and names it where it is needed."""
     code = (

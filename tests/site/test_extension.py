@@ -11,7 +11,7 @@ import pytest
 from bs4 import BeautifulSoup
 from sphinx.errors import SphinxError
 
-from replication.site.extension import HOLDS, formula, improve_tables, source_of
+from replication.site.extension import HOLDS, formula, improve_tables
 
 
 def table(*rows: tuple[str, ...]) -> str:
@@ -82,17 +82,6 @@ def test_what_holds_has_a_bar() -> None:
     assert second.find(class_="bar") is None
     assert [cell["data-label"] for cell in page.tbody.find_all("td")] == ["Claim", HOLDS] * 2
     assert improved(("Claim", "n"), *rows).table["class"] == ["sortable"]
-
-
-def test_the_code_of_an_object_is_a_file() -> None:
-    """An address leads to the module's text and to the object; what is not ours has none."""
-    info = {"module": "replication.site.extension", "fullname": "formula"}
-    assert source_of("py", info) == (
-        "code/replication/site/extension.py.txt#:~:text=def%20formula&text=class%20formula"
-    )
-    package = source_of("py", {"module": "replication.site", "fullname": "x"}) or ""
-    assert package.startswith("code/replication/site/__init__.py.txt#")
-    assert source_of("py", {"module": "numpy", "fullname": "array"}) is None
 
 
 def test_tables_can_be_downloaded() -> None:

@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
 from gymnasium.wrappers import TransformAction
 
 from replication import GymTask, TaskError
@@ -45,6 +46,34 @@ def test_a_table_says_what_stepping_says() -> None:
                 break
         assert task.replay(actions).tolist() == states
         assert task.fault(np.array(states), np.array(actions)) is None
+
+
+class Icier(FrozenLakeEnv):
+    """A lake whose steps are not those of its table."""
+
+    def step(self, action: Any) -> Any:
+        """Take the opposite action."""
+        return super().step((action + 2) % 4)  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.parametrize(
+    "env", [gymnasium.make("Taxi-v4", fickle_passenger=True), Icier(is_slippery=False)]
+)
+def test_a_table_that_steps_do_not_follow_is_not_used(env: gymnasium.Env[Any, Any]) -> None:
+    """An environment whose steps may differ from its table is stepped."""
+    assert isinstance(GymTask(env).task, WrappedTask)
+
+
+def test_a_file_names_the_environment_not_how_it_is_shown() -> None:
+    """Options are described, a limit of steps of one's own among them; a picture is none."""
+    assert options(lake(is_slippery=False)) == options(lake()) | {"is_slippery": False}
+    assert options(lake(render_mode="rgb_array")) == options(lake())
+    assert options(lake(max_episode_steps=9)) == options(lake()) | {"max_episode_steps": 9}
+
+
+def options(env: gymnasium.Env[Any, Any]) -> Any:
+    """Return what a demonstration file says of an environment's options."""
+    return GymTask(env).describe()["options"]
 
 
 def test_a_move_that_ends_nothing_where_another_does_is_refused() -> None:
