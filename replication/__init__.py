@@ -12,6 +12,7 @@ A name is imported when it is first used, so that the command `replicate` starts
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from replication.baselines import BASELINES
     from replication.demos.checks import DemoError
     from replication.demos.csv import read_csv
     from replication.demos.files import check_demos, load_demos, save_demos
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "BASELINES",
     "METHODS",
     "Bins",
     "Demo",
@@ -69,6 +71,7 @@ __all__ = [
 
 if not TYPE_CHECKING:  # a type checker would take it to know every name
     _MODULES = {
+        "baselines": ("BASELINES",),
         "demos.checks": ("DemoError",),
         "demos.csv": ("read_csv",),
         "demos.files": ("check_demos", "load_demos", "save_demos"),

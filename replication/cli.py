@@ -544,7 +544,7 @@ def export(out: Path) -> None:
     "--method",
     default="unified-incorrect",
     metavar="METHOD",
-    help="adaboost, unified or unified-incorrect.",
+    help="adaboost, unified, unified-incorrect or a baseline, see docs/beyond.md.",
 )
 @number("--seed", 0, "Root seed.", default=0)
 @click.option(
@@ -569,14 +569,14 @@ def learn(
     Writes TASK-METHOD.json and a picture of it. A result that has not converged is a result: it
     is reported as such, with exit code 0 unless --strict is given.
     """
+    from replication.baselines import find_method
     from replication.demos.files import load_demos
     from replication.fitting import fit, own_params
-    from replication.irl import get_method
     from replication.progress import iteration_meter
     from replication.report.style import save_figure
 
     _catch_signals()
-    uses_incorrect = get_method(method).uses_incorrect
+    uses_incorrect = find_method(method).uses_incorrect
     if incorrect not in (None, "none") and not uses_incorrect:
         raise UserError(f"the method {method!r} uses no incorrect demos; leave out --incorrect")
     if "incorrect" in parameters:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replication.baselines import BaselineCondition
 from replication.demos.checks import DemoWarning
 from replication.demos.files import different_ways, doubts
 from replication.demos.lists import Trajectory, make_demos
@@ -23,7 +24,6 @@ from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
 from replication.result import Fit, FitError, taken
-from replication.trials.condition import Condition
 
 if TYPE_CHECKING:  # it takes long to import
     import pandas as pd
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Watched(Condition):
+class _Watched(BaselineCondition):
     """A condition that reports each weight update of its trial, and the error before it."""
 
     report: Callable[[int, float], None]
@@ -79,7 +79,7 @@ def fit(
         The environment of such lists, a task of your own or a maze; or one in whose place `demos`
         are checked again.
     method
-        A name in :data:`replication.METHODS`.
+        A name in :data:`replication.METHODS` or :data:`replication.BASELINES`.
     params
         Parameters; by default those of `own_params`.
     seed
@@ -126,7 +126,7 @@ def fit(
         raise FitError(f"give {min(values)} = {show(values[min(values)])} or params, not both")
     chosen = params if params is not None else own_params(checked, **values)
     given = (checked, method, chosen)
-    condition = Condition(*given) if report is None else _Watched(*given, report)
+    condition = BaselineCondition(*given) if report is None else _Watched(*given, report)
     trial = condition.trial(seed=trial_seeds(seed, 1)[0])
     episode = trial.episodes[taken(trial.errors, chosen)]
     result = Fit(

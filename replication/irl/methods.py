@@ -16,7 +16,7 @@ from replication.paper.register import ChoiceError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Method:
     """An IRL method, and all that the rest of the package needs to know about it.
 
@@ -27,8 +27,9 @@ class Method:
     readings
         The readings of Eq. 9 (choice F-INDEX) under which it is run; a single "" if it has no
         trace.
-    uses_incorrect
-        Whether the update is given mu_B; otherwise it sees no incorrect pair.
+    use
+        What it makes of incorrect demonstrations: "nothing", "marked pairs", whose mu_B the update
+        is given, or "whole trajectories".
     baseline
         Name of the method that it is compared with, or "".
     start
@@ -41,13 +42,18 @@ class Method:
     label: str
     colour: str
     readings: tuple[str, ...]
-    uses_incorrect: bool
+    use: str
     baseline: str
     start: Callable[[tuple[int, int], Update], Array]
     update: Callable[
         [Array, Array, Array, Array, NDArray[np.bool_], Update],
         tuple[Array, Array],
     ]
+
+    @property
+    def uses_incorrect(self) -> bool:
+        """Whether it is given incorrect demonstrations."""
+        return self.use != "nothing"
 
     def under(self, reading: str) -> str:
         """Return the reading under which this method is run when others are run under `reading`.
@@ -74,7 +80,7 @@ METHODS: dict[str, Method] = {
             label="AdaBoost-IRL (R1)",
             colour="#7A7A7A",
             readings=("",),
-            uses_incorrect=False,
+            use="nothing",
             baseline="",
             start=adaboost.start,
             update=adaboost.update,
@@ -84,7 +90,7 @@ METHODS: dict[str, Method] = {
             label="Unified, without incorrect",
             colour="#0072B2",
             readings=TRACES,
-            uses_incorrect=False,
+            use="nothing",
             baseline="adaboost",
             start=unified.start,
             update=unified.update,
@@ -94,7 +100,7 @@ METHODS: dict[str, Method] = {
             label="Unified, with incorrect",
             colour="#D55E00",
             readings=READINGS,
-            uses_incorrect=True,
+            use="marked pairs",
             baseline="unified",
             start=unified.start,
             update=unified.update,

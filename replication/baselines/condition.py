@@ -1,0 +1,116 @@
+"""A condition with any method: of the paper, or a baseline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replication.baselines.baseline import Baseline
+from replication.baselines.cloning import Copier
+from replication.baselines.problem import Problem, table_of
+from replication.baselines.registry import BASELINES, find_method
+from replication.demos.model import Demos
+from replication.irl import Method, Trial
+from replication.irl.agent import Agent
+from replication.irl.expectations import mean_expectations
+from replication.paper.params import Update
+from replication.paper.register import ChoiceError
+from replication.trials.condition import Condition
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BaselineCondition(Condition):
+    """A condition whose method may be a baseline.
+
+    A method that finds its reward beforehand is run for one iteration, in which the agent learns by
+    that reward.
+
+    Raises
+    ------
+    ChoiceError
+        If the method needs what the demonstrations or their task do not have.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        method = self.named
+        if not isinstance(method, Baseline) or method.find is None:
+            return
+        if table_of(self.demos.environment) is None:
+            others = [name for name, method in BASELINES.items() if method.find is None]
+            raise ChoiceError(
+                f"the method {self.method!r} needs the table of moves, which a task of the kind "
+                f"{self.demos.environment.kind!r} does not have; without it work: "
+                f"{', '.join(others)}"
+            )
+        if self.params.learner.gamma == 1:
+            raise ChoiceError(f"the method {self.method!r} plans: set gamma = 0.99")
+        if method.needs_incorrect and not self.selected.incorrect:
+            raise ChoiceError(
+                f"the method {self.method!r} compares correct with incorrect demonstrations, and "
+                "there are no incorrect ones"
+            )
+
+    @property
+    def named(self) -> Method:
+        """The method as it is registered."""
+        return find_method(self.method)
+
+    @cached_property
+    def selected(self) -> Demos:
+        """The demonstrations that the method is given."""
+        kinds = self.params.demonstrations.incorrect if self.named.uses_incorrect else "none"
+        return self.demos.select(kinds)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What a method is given that finds its reward beforehand; `plans` is counted there."""
+        moves = table_of(self.demos.environment)
+        assert moves is not None
+        demos, gamma = self.selected, self.params.learner.gamma
+        return Problem(moves, demos.correct, demos.incorrect, gamma)
+
+    @cached_property
+    def weights(self) -> Array | None:
+        """The reward of a method that finds it beforehand, [state, action]; else None."""
+        find = self.named.find if isinstance(self.named, Baseline) else None
+        return None if find is None else find(self.problem)
+
+    @property
+    def rule(self) -> Method:
+        """The method itself, for the loop."""
+        weights = self.weights
+        if weights is None:
+            return self.named
+
+        def update(
+            w: Array,
+            memory: Array,
+            mu_e: Array,
+            mu_i: Array,
+            mu_b: NDArray[np.bool_],
+            params: Update,
+        ) -> tuple[Array, Array]:
+            return weights, memory
+
+        return replace(self.named, update=update)
+
+    @cached_property
+    def agent(self) -> Agent:
+        """The agent that learns in the environment, or copies the expert."""
+        agent = super().agent
+        if self.method != "cloning":
+            return agent
+        gamma, shape = self.params.learner.gamma, agent.shape
+        return Copier(agent, mean_expectations(self.selected.correct, gamma=gamma, shape=shape))
+
+    def trial(self, *, seed: np.random.SeedSequence, keep: bool = False) -> Trial:
+        """Run one trial; what a copier prefers stands in place of its Q-table."""
+        trial = super().trial(seed=seed, keep=keep)
+        agent = self.agent
+        return replace(trial, q=agent.preferences) if isinstance(agent, Copier) else trial
