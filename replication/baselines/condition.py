@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from replication.baselines.agents import Copier, Planner
 from replication.baselines.baseline import Baseline
-from replication.baselines.cloning import Copier
 from replication.baselines.problem import Problem, table_of
 from replication.baselines.registry import BASELINES, find_method
 from replication.demos.model import Demos
@@ -102,12 +102,15 @@ class BaselineCondition(Condition):
 
     @cached_property
     def agent(self) -> Agent:
-        """The agent that learns in the environment, or copies the expert."""
-        agent = super().agent
-        if self.method != "cloning":
-            return agent
-        gamma, shape = self.params.learner.gamma, agent.shape
-        return Copier(agent, mean_expectations(self.selected.correct, gamma=gamma, shape=shape))
+        """The agent that learns or plans in the environment, or copies the expert."""
+        agent, gamma = super().agent, self.params.learner.gamma
+        if self.method == "cloning":
+            mu_e = mean_expectations(self.selected.correct, gamma=gamma, shape=agent.shape)
+            return Copier(agent, mu_e)
+        moves = table_of(self.demos.environment)
+        if self.params.learner.solver == "planning" and moves is not None:
+            return Planner(agent, moves, gamma)
+        return agent
 
     def trial(self, *, seed: np.random.SeedSequence, keep: bool = False) -> Trial:
         """Run one trial; what a copier prefers stands in place of its Q-table."""
