@@ -128,11 +128,11 @@ def fit(
     given = (checked, method, chosen)
     condition = BaselineCondition(*given) if report is None else _Watched(*given, report)
     trial = condition.trial(seed=trial_seeds(seed, 1)[0])
-    episode = trial.episodes[taken(trial.errors, chosen)]
+    episode = trial.episodes[taken(trial.errors, condition.params)]
     result = Fit(
         demos=checked,
         method=method,
-        params=chosen,
+        params=condition.params,
         seed=seed,
         weights=trial.weights,
         q=trial.q,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,22 @@ from replication.trials.condition import Condition
 Array = NDArray[np.float64]
 
 
+class Found(NamedTuple):
+    """The weights [state, action] that a method without a loop found, by so many plans."""
+
+    weights: Array
+    plans: int
+
+
+_FOUND: dict[tuple[str, str, float], Found] = {}
+
+
 @dataclass(frozen=True)
 class BaselineCondition(Condition):
     """A condition whose method may be a baseline.
 
     A method that finds its reward beforehand is run for one iteration, in which the agent learns by
-    that reward.
+    that reward, whatever cap the parameters have.
 
     Raises
     ------
@@ -55,6 +66,8 @@ class BaselineCondition(Condition):
                 f"the method {self.method!r} compares correct with incorrect demonstrations, and "
                 "there are no incorrect ones"
             )
+        loop = replace(self.params.loop, max_iterations=1)
+        object.__setattr__(self, "params", replace(self.params, loop=loop))
 
     @property
     def named(self) -> Method:
@@ -67,26 +80,26 @@ class BaselineCondition(Condition):
         kinds = self.params.demonstrations.incorrect if self.named.uses_incorrect else "none"
         return self.demos.select(kinds)
 
-    @cached_property
-    def problem(self) -> Problem:
-        """What a method is given that finds its reward beforehand; `plans` is counted there."""
-        moves = table_of(self.demos.environment)
-        assert moves is not None
-        demos, gamma = self.selected, self.params.learner.gamma
-        return Problem(moves, demos.correct, demos.incorrect, gamma)
-
-    @cached_property
-    def weights(self) -> Array | None:
-        """The reward of a method that finds it beforehand, [state, action]; else None."""
-        find = self.named.find if isinstance(self.named, Baseline) else None
-        return None if find is None else find(self.problem)
+    @property
+    def found(self) -> Found:
+        """What a method without a loop finds; it is found once in each process."""
+        key = self.method, self.selected_hash, self.params.learner.gamma
+        if key not in _FOUND:
+            moves = table_of(self.demos.environment)
+            find = self.named.find if isinstance(self.named, Baseline) else None
+            assert moves is not None
+            assert find is not None
+            demos = self.selected
+            problem = Problem(moves, demos.correct, demos.incorrect, self.params.learner.gamma)
+            _FOUND[key] = Found(find(problem), problem.plans)
+        return _FOUND[key]
 
     @property
     def rule(self) -> Method:
         """The method itself, for the loop."""
-        weights = self.weights
-        if weights is None:
-            return self.named
+        method = self.named
+        if not isinstance(method, Baseline) or method.find is None:
+            return method
 
         def update(
             w: Array,
@@ -96,9 +109,9 @@ class BaselineCondition(Condition):
             mu_b: NDArray[np.bool_],
             params: Update,
         ) -> tuple[Array, Array]:
-            return weights, memory
+            return self.found.weights, memory
 
-        return replace(self.named, update=update)
+        return replace(method, update=update)
 
     @cached_property
     def agent(self) -> Agent:
