@@ -35,6 +35,7 @@ BASELINES: dict[str, Baseline] = {
             colour="#CC79A7",
             readings=TRACES,
             use="marked pairs",
+            baseline="unified",
             start=wary.start,
             update=wary.update,
         ),

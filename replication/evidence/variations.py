@@ -48,7 +48,7 @@ def maze_conditions(specification: Specification, cap: int) -> dict[Key, Conditi
     for id in ("DEMO-SHAPE", "DEMO-PATH", "DETOUR-WIDTH"):
         if id in choices:
             expert[_name(id)] = choices.pop(id)
-    demos = _maze_demos(world, Expert(**expert))
+    demos = maze_demos(world, Expert(**expert))
     return _chosen_reading(demos, {"max_iterations": cap}, choices, "open-maze")
 
 
@@ -98,7 +98,8 @@ def _name(id: str) -> str:
 
 
 @cache
-def _maze_demos(world: str, expert: Expert) -> Demos:
+def maze_demos(world: str, expert: Expert) -> Demos:
+    """Return the demonstrations of a maze: "open", "obstacles" or "random-k"."""
     task, maze = _world(world)
     return demonstrate(task, maze, params=expert)
 
@@ -188,7 +189,7 @@ def numbered_conditions(ablations: Ablations, cap: int) -> dict[tuple[int, str],
 
     Keys are the number of demonstrations and the reading of Eq. 9.
     """
-    demos = _maze_demos("open", Expert())
+    demos = maze_demos("open", Expert())
     every = _each_wrong_pair(demos, np.random.SeedSequence(ablations.seed))
     conditions: dict[tuple[int, str], Condition] = {}
     for number in ablations.numbers:
