@@ -28,7 +28,7 @@ from replication.irl import METHODS, Method
 from replication.irl.methods import TRACES
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
-from replication.trials.measures import numbers_in
+from replication.trials.measures import error_histories, numbers_in
 from replication.trials.table import Group
 
 PART = "comparison"
@@ -148,6 +148,72 @@ def comparison_table(trials: pd.DataFrame) -> pd.DataFrame:
         if setting.set != NONE and without in counts:
             row |= _mean("saved", counts[without] - counts[setting])
         rows.append(row)
+    return pd.DataFrame(rows)
+
+
+PAPER_MAZES = ("open-maze", "obstacle-maze")
+
+
+def noise_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return how the iterations of the paper's methods divide into method and learner.
+
+    Returns
+    -------
+    DataFrame
+        One row for each maze of the paper, method and reading, with the general list where the
+        method takes any: `learned` and `planned`, the mean iterations with Q-learning and with
+        exact planning inside, and their SDs; `noise` the mean difference over the same seeds, with
+        its 95 % interval; `iterations_learned` and `iterations_planned`, those of each trial,
+        separated by blanks.
+    """
+    counts = {}
+    for number, setting in enumerate(conditions()):
+        if setting.task in PAPER_MAZES and setting.method in METHODS:
+            own = trials[(trials["part"] == PART) & (trials["number"] == number)]
+            counts[setting] = own.sort_values("trial")["iterations"].to_numpy(float)
+    rows = []
+    for setting, learned in counts.items():
+        if setting.solver != "q-learning":
+            continue
+        planned = counts[setting._replace(solver="planning")]
+        row = {**setting._asdict(), "n": len(learned)}
+        del row["solver"]
+        for name, values in (("learned", learned), ("planned", planned)):
+            row |= {name: values.mean(), f"{name}_sd": values.std(ddof=1)}
+        row |= _mean("noise", learned - planned)
+        for name, values in (("learned", learned), ("planned", planned)):
+            row[f"iterations_{name}"] = " ".join(f"{value:.0f}" for value in values)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+START = ("perceptron", "unified", "unified-incorrect", "wary")
+"""The methods whose first iterations are looked at."""
+
+
+def start_table(trials: pd.DataFrame) -> pd.DataFrame:
+    """Return how trials with Q-learning begin on the paper's mazes, under the printed reading.
+
+    Returns
+    -------
+    DataFrame
+        One row for each maze and method, with the general list where it takes any: mean
+        `collisions` while learning and `errors` of greedy trajectories in the initial phase
+        (EARLY), with 95 % intervals; `d`, the median error before each iteration, separated by
+        blanks; a trial that has ended keeps its last.
+    """
+    rows = []
+    for number, setting in enumerate(conditions()):
+        printed = setting.reading in ("", TRACES[0])
+        wanted = setting.task in PAPER_MAZES and setting.method in START
+        if not (wanted and printed and setting.solver == "q-learning"):
+            continue
+        own = trials[(trials["part"] == PART) & (trials["number"] == number)]
+        row = {**setting._asdict(), "n": len(own)}
+        for name in ("collisions", "errors"):
+            row |= _mean(name, own[f"early_{name}"].to_numpy(float))
+        median = np.median(error_histories(own), axis=0)
+        rows.append(row | {"d": " ".join(f"{d:.4g}" for d in median)})
     return pd.DataFrame(rows)
 
 
