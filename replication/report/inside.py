@@ -35,6 +35,8 @@ def draw_noise(numbers: pd.DataFrame) -> Figure:
     """Draw a panel for each maze: each trial as a point, a row for each method and solver."""
     numbers = numbers.fillna({"reading": ""})
     tasks = list(dict.fromkeys(numbers["task"]))
+    names = ["iterations_learned", "iterations_planned"]
+    most = max(x.max() for name in names for x in numbers_in(numbers[name]))
     figure, axes = canvas(1, len(tasks), height=3.0, sharex=True, sharey=True)
     for letter, panel, task in zip("ab", axes, tasks, strict=True):
         own = numbers[numbers["task"] == task]
@@ -48,7 +50,7 @@ def draw_noise(numbers: pd.DataFrame) -> Figure:
         panel.set_title(f"({letter}) {TASKS[task]}", size=8, loc="left")
         panel.set_xlabel("iterations", size=8)
         panel.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-        panel.set_xlim(0, None)
+        panel.set_xlim(0, most + 2)
     labels = [short_label(row.method, row.reading, row.set) for row in own.itertuples()]
     axes[0].set_yticks(range(len(labels)), labels, size=7.5)
     axes[0].set_ylim(len(labels) - 0.5, -0.5)
@@ -70,9 +72,7 @@ def readable_noise(table: pd.DataFrame) -> pd.DataFrame:
             "Method": lambda row: short_label(row.method, row.reading, row.set),
             "Q-learning: mean (SD)": lambda row: f"{row.learned:.1f} ({row.learned_sd:.1f})",
             "Planning: mean (SD)": lambda row: f"{row.planned:.1f} ({row.planned_sd:.1f})",
-            "Due to learning [95 %]": lambda row: interval(
-                row.noise, row.noise_low, row.noise_high
-            ),
+            "Difference [95 %]": lambda row: interval(row.noise, row.noise_low, row.noise_high),
         },
     )
 
@@ -110,7 +110,8 @@ def draw_beginning(numbers: pd.DataFrame) -> Figure:
             panel.set_yticks([])
             panel.set_ylim(len(own) - 0.5, -0.5)
             panel.set_xlim(0, None)
-            panel.xaxis.set_major_locator(MaxNLocator(4))
+            panel.xaxis.set_major_locator(MaxNLocator(3))
+            panel.xaxis.set_major_formatter(lambda x, _: f"{x:,.0f}")
     titles = ("(a) error", "(b) erroneous motions", "(c) collisions while learning")
     for panel, title in zip(axes[0], titles, strict=True):
         panel.set_title(title, size=8, loc="left")

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from replication.baselines import BASELINES, find_method
+from replication.baselines.baseline import Baseline
+from replication.evidence import comparison
+from replication.evidence.comparison import (
+    IN_SOCCER,
+    MAZES,
+    Setting,
+    comparison_table,
+    conditions,
+    noise_table,
+    start_table,
+)
+from replication.evidence.experiments import GENERAL, NONE
+from replication.evidence.statistics import mean_interval
+from replication.irl import METHODS
+from replication.irl.methods import TRACES
+from replication.trials.table import planned_table
+
+N = 4
+
+
+def made_up() -> pd.DataFrame:
+    """Make up trials: each of its own number of iterations, every fifth condition ends at d = 2."""
+    trials = planned_table(comparison.plan(N), seed=1)
+    number, trial = trials["number"].to_numpy(), trials["trial"].to_numpy()
+    last = np.where(number % 5 == 0, 2.0, 0.0)
+    return trials.assign(
+        iterations=number + trial**2,
+        converged=(last == 0).astype(int),
+        steps=1000 * number + trial,
+        errors=[f"3 {d + 1} {d}" for d in last],
+        early_collisions=10 * number + trial,
+        early_errors=number,
+    )
+
+
+TRIALS = made_up()
+TABLE = comparison_table(TRIALS)
+
+
+def row(setting: Setting) -> Any:
+    """Return a row of the table."""
+    (found,) = TABLE[(TABLE[list(setting._fields)] == list(setting)).all(axis=1)].itertuples()
+    return found
+
+
+def test_every_method_meets_every_maze() -> None:
+    """Each is there with both solvers, under both traces, and with the list if it takes any."""
+    for name in (*METHODS, *BASELINES):
+        method = find_method(name)
+        own = [setting for setting in conditions() if setting.method == name]
+        mazes = {setting.task for setting in own} - {"soccer"}
+        assert len(mazes) == len(MAZES)
+        assert {setting.solver for setting in own} == {"q-learning", "planning"}
+        traces = [reading for reading in method.readings if reading in ("", *TRACES)]
+        assert {setting.reading for setting in own} == set(traces)
+        sets = {setting.set for setting in own if setting.task in mazes}
+        assert (GENERAL in sets) == method.uses_incorrect
+        alone = isinstance(method, Baseline) and method.needs_incorrect
+        assert (NONE in sets) == (not alone and not (method.uses_incorrect and method.baseline))
+    soccer = {setting.method for setting in conditions() if setting.task == "soccer"}
+    assert soccer == set(IN_SOCCER)
+
+
+def test_the_table_is_of_the_trials() -> None:
+    """Means and intervals by hand: of d at the end, iterations and steps; the share at zero."""
+    for number, setting in enumerate(conditions()):
+        found = row(setting)
+        counts = np.array([number + trial**2 for trial in range(N)], float)
+        low, high = map(float, mean_interval(counts))
+        assert found.iterations == pytest.approx(counts.mean())
+        assert (found.iterations_low, found.iterations_high) == pytest.approx((low, high))
+        assert found.d == (2.0 if number % 5 == 0 else 0.0)
+        assert found.reached == (number % 5 != 0)
+        assert found.steps == pytest.approx(1000 * number + 1.5)
+
+
+def test_savings_are_against_the_method_without() -> None:
+    """What is saved has the sign of fewer, against the method that it is without incorrect ones."""
+    numbers = {setting: number for number, setting in enumerate(conditions())}
+    with_ = Setting("open-maze", "unified-incorrect", "updated", GENERAL, "q-learning")
+    without = with_._replace(method="unified", set=NONE)
+    assert row(with_).saved == numbers[without] - numbers[with_]
+    assert row(with_._replace(method="wary")).saved == (
+        numbers[without] - numbers[with_._replace(method="wary")]
+    )
+    assert np.isnan(row(without).saved)
+
+
+def test_plans_are_counted() -> None:
+    """Planning inside takes a plan an iteration; what plans beforehand has these besides."""
+    learned = Setting("open-maze", "unified", "printed", NONE, "q-learning")
+    assert row(learned).plans == 0
+    planned = row(learned._replace(solver="planning"))
+    assert planned.plans == planned.iterations
+    for name, method in BASELINES.items():
+        if method.find is not None and not method.needs_incorrect:
+            setting = Setting("open-maze", name, "", NONE, "q-learning")
+            assert row(setting).plans == conditions()[setting].found.plans
+
+
+def test_the_learners_noise_is_paired() -> None:
+    """Its table has the difference of the two solvers, the paper's methods and its mazes only."""
+    table = noise_table(TRIALS)
+    assert set(table["method"]) == set(METHODS)
+    assert set(table["task"]) == {"open-maze", "obstacle-maze"}
+    numbers = {setting: number for number, setting in enumerate(conditions())}
+    for found in table.itertuples():
+        learned = Setting(found.task, found.method, found.reading, found.set, "q-learning")
+        planned = learned._replace(solver="planning")
+        assert found.noise == numbers[learned] - numbers[planned]
+        assert found.noise_low == found.noise_high == found.noise
+        assert len(found.iterations_learned.split()) == N
+
+
+def test_the_beginning_is_that_of_the_printed_reading() -> None:
+    """Means of the initial phase, and the median of d before each iteration."""
+    table = start_table(TRIALS)
+    numbers = {setting: number for number, setting in enumerate(conditions())}
+    assert set(table["method"]) == {"perceptron", "unified", "unified-incorrect", "wary"}
+    for found in table.itertuples():
+        assert found.reading in ("", "printed")
+        setting = Setting(found.task, found.method, found.reading, found.set, "q-learning")
+        assert found.errors == numbers[setting]
+        assert found.collisions == 10 * numbers[setting] + 1.5
+        assert found.d in ("3 1 0", "3 3 2")
