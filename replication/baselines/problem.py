@@ -79,7 +79,12 @@ class Problem:
 
     def follow(self, q: Array) -> Array:
         """Return the feature expectations of the greedy policy; the first of equals is taken."""
-        return self.visits(np.eye(q.shape[1])[q.argmax(axis=1)])
+        policy = q.argmax(axis=1)
+        next_state = certain(self.moves)
+        if next_state is None or len(self.moves.starts) > 1:
+            return self.visits(np.eye(q.shape[1])[policy])
+        start, ends = self.moves.starts[0], self.moves.ends
+        return policy_iteration.visits(next_state, ends, policy, start, gamma=self.gamma)
 
 
 def plan_on(moves: Moves, weights: Array, *, gamma: float, q: Array | None = None) -> Array:
@@ -87,11 +92,18 @@ def plan_on(moves: Moves, weights: Array, *, gamma: float, q: Array | None = Non
 
     `q` is where to begin: the nearer it is, the sooner it is done.
     """
+    next_state = certain(moves)
+    if next_state is None:
+        return sweeps.optimal(moves, weights, gamma=gamma, q=q)
+    return policy_iteration.iterate(next_state, moves.ends, weights, gamma=gamma, q=q)
+
+
+def certain(moves: Moves) -> NDArray[np.int64] | None:
+    """Return where each action leads, [state, action]; None if chance decides some move."""
     n_pairs = len(moves.first) - 2
     if moves.first[-2] > n_pairs:
-        return sweeps.optimal(moves, weights, gamma=gamma, q=q)
-    next_state = moves.successors[:n_pairs].reshape(moves.shape)
-    return policy_iteration.iterate(next_state, moves.ends, weights, gamma=gamma, q=q)
+        return None
+    return moves.successors[:n_pairs].reshape(moves.shape)
 
 
 def table_of(environment: Environment) -> Moves | None:

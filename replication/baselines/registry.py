@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from replication.baselines import one_line, perceptron, wary
+from replication.baselines import (
+    margin_perceptron,
+    max_margin,
+    mwal,
+    one_line,
+    perceptron,
+    projection,
+    wary,
+)
 from replication.baselines.baseline import Baseline
 from replication.errors import unknown
 from replication.irl import METHODS, Method
@@ -28,6 +36,32 @@ BASELINES: dict[str, Baseline] = {
             label="Perceptron (F = 1)",
             colour="#009E73",
             update=perceptron.update,
+        ),
+        Baseline(
+            name="margin-perceptron",
+            label="Perceptron with margin",
+            colour="#E69F00",
+            find=margin_perceptron.find,
+        ),
+        Baseline(
+            name="projection",
+            label="Projection",
+            colour="#332288",
+            start=projection.start,
+            update=projection.update,
+        ),
+        Baseline(
+            name="mwal",
+            label="MWAL",
+            colour="#44AA99",
+            update=mwal.update,
+        ),
+        Baseline(
+            name="max-margin",
+            label="Maximum margin",
+            colour="#882255",
+            use="marked pairs",
+            find=max_margin.find,
         ),
         Baseline(
             name="wary",

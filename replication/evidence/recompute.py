@@ -9,13 +9,14 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import joblib
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from replication.evidence import calibration, rounding, sweep
+from replication.evidence import calibration, comparison, rounding, sweep
 from replication.evidence.experiments import condition_of
 from replication.evidence.tables import csv_text
 from replication.files import read_file
@@ -26,6 +27,12 @@ from replication.trials.measures import ALONG, Report, factors, trial_row
 from replication.trials.results import digest
 from replication.trials.run import workers
 from replication.trials.store import DamagedTrialError, Store
+
+DESIGNS: Mapping[str, Callable[[], Mapping[Any, Condition]]] = {
+    rounding.PART: rounding.conditions,
+    comparison.PART: comparison.conditions,
+}
+"""The conditions of a part of a table of trials, in the order of its column `number`."""
 
 
 def recompute_trials(
@@ -131,8 +138,8 @@ def declared_condition(row: Mapping[str, str]) -> Condition:
         raise LookupError(f"there is no number {row['number']}")
     if row["part"] in calibration.PARTS:
         conditions = [calibration.condition(calibration.points()[int(row["number"])])]
-    elif row["part"] == rounding.PART:
-        conditions = [list(rounding.conditions().values())[int(row["number"])]]
+    elif row["part"] in DESIGNS:
+        conditions = [list(DESIGNS[row["part"]]().values())[int(row["number"])]]
     else:
         conditions = sweep.conditions_of(row["part"], int(row["number"]))
     for condition in conditions:

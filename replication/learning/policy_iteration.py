@@ -67,6 +67,33 @@ def iterate(
     return found
 
 
+def visits(
+    next_state: NDArray[np.int64],
+    ends: NDArray[np.bool_],
+    policy: NDArray[np.int64],
+    start: int,
+    *,
+    gamma: float,
+) -> Array:
+    """Return the discounted visits mu(s, a) (Eq. 7) of a policy that takes `policy` [state]."""
+    mu = np.zeros(next_state.shape)
+    if gamma > 0:
+        _visit(next_state, ends, policy, start, gamma, mu)
+    else:
+        mu[start, policy[start]] = 1.0
+    return mu
+
+
+@cached
+def _visit(next_state, ends, policy, start, gamma, mu):
+    """Add up what is left of the discount, until it is too small to be added to 1."""
+    s, left = start, 1.0
+    while not ends[s] and left > 1e-17:
+        mu[s, policy[s]] += left
+        left *= gamma
+        s = next_state[s, policy[s]]
+
+
 @cached
 def _iterate(next_state, ends, weights, gamma, policy, values, q):
     """Improve `policy` until nothing is better; leave the values of its actions in `q`."""

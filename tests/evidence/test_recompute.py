@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from replication import Demos, save_demos
-from replication.evidence import calibration, rounding, sweep
+from replication.evidence import calibration, comparison, rounding, sweep
 from replication.evidence.experiments import EXPERIMENTS, Experiment
 from replication.evidence.recompute import declared_condition, recompute_trials, sampled
 from replication.evidence.tables import write_csv
@@ -177,6 +177,7 @@ def planned() -> list[Group]:
         *screen(pd.DataFrame())[:3],
         Group([finalist], 1, {"part": "final", "number": 77}),
         *rounding.plan(1)[:4],
+        *comparison.plan(1)[::9],
     ]
 
 
@@ -185,7 +186,7 @@ def test_conditions_of_all_parts_come_back() -> None:
     groups = planned()
     assert {group.labels["part"] for group in groups} == {
         *sweep.TRIALS,
-        *("screen", "final", "rounding"),
+        *("screen", "final", "rounding", "comparison"),
     }
     for group in groups:
         table = planned_table([group], 7)
@@ -201,6 +202,7 @@ def test_conditions_of_all_parts_come_back() -> None:
     [
         *(("mazes", "-1"), ("mazes", "1000"), ("numbers", "99"), ("unheard", "0")),
         *(("screen", "480"), ("final", "480"), ("fits", "960"), ("fits", "-1"), ("rounding", "90")),
+        ("comparison", "999"),
     ],
 )
 def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:
