@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from replication.baselines import one_line, perceptron, wary
+from replication.baselines import bayesian, one_line, perceptron, ranking, wary
 from replication.baselines.baseline import Baseline
 from replication.errors import unknown
 from replication.irl import METHODS, Method
@@ -38,6 +38,21 @@ BASELINES: dict[str, Baseline] = {
             baseline="unified",
             start=wary.start,
             update=wary.update,
+        ),
+        Baseline(
+            name="bayesian",
+            label="Bayesian IRL",
+            colour="#332288",
+            use="marked pairs",
+            find=bayesian.find,
+        ),
+        Baseline(
+            name="ranking",
+            label="Ranking",
+            colour="#999933",
+            use="whole trajectories",
+            find=ranking.find,
+            needs_incorrect=True,
         ),
     )
 }
