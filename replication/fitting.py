@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replication.baselines import BaselineCondition
+from replication.baselines import BASELINES, BaselineCondition, find_method
 from replication.demos.checks import DemoWarning
 from replication.demos.files import different_ways, doubts
 from replication.demos.lists import Trajectory, make_demos
@@ -19,10 +19,11 @@ from replication.demos.model import Demos
 from replication.envs.environment import Environment
 from replication.envs.tasks.base import is_over, is_random
 from replication.errors import clip, show
-from replication.irl import Method
+from replication.irl import METHODS, Method
 from replication.irl.expectations import norm
 from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
+from replication.paper.register import ChoiceError
 from replication.result import Fit, FitError, taken
 
 if TYPE_CHECKING:  # it takes long to import
@@ -92,7 +93,8 @@ def fit(
     Raises
     ------
     ChoiceError
-        If the method or a parameter is unknown, or a value is out of range.
+        If the method or a parameter is unknown, a value is out of range, or `incorrect` demos are
+        chosen for a method that uses none.
     DemoError, TaskError
         If the task cannot have gone as demonstrated, or the demonstrations lack a kind that the
         parameters ask for.
@@ -119,7 +121,7 @@ def fit(
     """
     checked = _checked(demos, task)
     if "incorrect" in values:
-        checked = checked.select(values.pop("incorrect"))
+        checked = checked.select(_useful(values.pop("incorrect"), method))
     if not isinstance(seed, int) or seed < 0:
         raise FitError(f"seed = {clip(repr(seed))} must be a whole number, at least 0")
     if params is not None and values:
@@ -201,6 +203,17 @@ def own_params(demos: Demos, **values: Any) -> Params:
         "plateau": PLATEAU if random or different_ways(demos) > 1 else 0,
     }
     return Params.of(**suited | values)
+
+
+def _useful(kinds: str, method: str) -> str:
+    """Return the kinds of incorrect demonstrations that a call asks for, if the method uses any."""
+    if kinds != "none" and not find_method(method).uses_incorrect:
+        able = [name for name, row in {**METHODS, **BASELINES}.items() if row.uses_incorrect]
+        raise ChoiceError(
+            f"the method {method!r} uses no incorrect demonstrations: leave out incorrect = "
+            f"{show(kinds)}, or take one of {', '.join(able)}"
+        )
+    return kinds
 
 
 def _untrained(result: Fit) -> list[str]:

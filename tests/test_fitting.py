@@ -148,6 +148,8 @@ def test_values_by_name_are_parameters(small_demos: Demos) -> None:
         (None, {"alpha": 1.5}, r"Update\.alpha = 1\.5 is not accepted .* from 0\.0 to 1\.0"),
         (None, {"alpha": float("nan")}, r"Update\.alpha = nan is not accepted"),
         (None, {"method": "unify"}, "unknown method"),
+        (None, {"method": "unify", "incorrect": "hit"}, "unknown method"),
+        (None, {"incorrect": "hits"}, "no incorrect demo of kind 'hits'; use all, none, hit"),
     ],
 )
 def test_mistakes_of_a_call_are_one_line(
@@ -200,6 +202,19 @@ def test_kinds_of_mistakes_are_chosen_by_name() -> None:
     for kinds in ("hole", "hole+bump", "none"):
         result = fit(ways, task=lake(), seed=1, incorrect=kinds)
         assert "+".join(result.demos.kinds) == kinds.replace("none", "")
+
+
+@pytest.mark.parametrize("method", ["adaboost", "unified", "perceptron", "one-line", "cloning"])
+def test_kinds_are_not_taken_by_who_uses_none(small_demos: Demos, method: str) -> None:
+    """A choice that would be ignored is refused, with the methods that do not; "none" is true."""
+    able = "unified-incorrect, wary, .*bayesian, .*ranking"
+    for kinds in ("hit", "all"):
+        with pytest.raises(UserError, match=f"'{method}' uses no .* take one of {able}") as caught:
+            fit(small_demos, method=method, seed=1, incorrect=kinds)
+        assert "\n" not in str(caught.value)
+        assert f"leave out incorrect = '{kinds}'" in str(caught.value)
+    result = fit(small_demos, method=method, seed=1, incorrect="none", solver="planning")
+    assert result.demos.incorrect == ()
 
 
 def test_many_fits_are_a_table() -> None:

@@ -60,7 +60,9 @@ class BaselineCondition(Condition):
                 f"{', '.join(others)}"
             )
         if self.params.learner.gamma == 1:
-            raise ChoiceError(f"the method {self.method!r} plans: set gamma = 0.99")
+            raise ChoiceError(
+                f"the method {self.method!r} needs a discount below 1: set gamma = 0.99"
+            )
         if method.needs_incorrect and not self.selected.incorrect:
             raise ChoiceError(
                 f"the method {self.method!r} compares correct with incorrect demonstrations, and "

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from replication.baselines import (
+    bayesian,
     margin_perceptron,
     max_margin,
     mwal,
     one_line,
     perceptron,
     projection,
+    ranking,
     wary,
 )
 from replication.baselines.baseline import Baseline
@@ -38,15 +40,9 @@ BASELINES: dict[str, Baseline] = {
             update=perceptron.update,
         ),
         Baseline(
-            name="margin-perceptron",
-            label="Perceptron with margin",
-            colour="#E69F00",
-            find=margin_perceptron.find,
-        ),
-        Baseline(
             name="projection",
             label="Projection",
-            colour="#332288",
+            colour="#88CCEE",
             start=projection.start,
             update=projection.update,
         ),
@@ -57,13 +53,6 @@ BASELINES: dict[str, Baseline] = {
             update=mwal.update,
         ),
         Baseline(
-            name="max-margin",
-            label="Maximum margin",
-            colour="#882255",
-            use="marked pairs",
-            find=max_margin.find,
-        ),
-        Baseline(
             name="wary",
             label="Unified, wary from the start (ours)",
             colour="#CC79A7",
@@ -72,6 +61,34 @@ BASELINES: dict[str, Baseline] = {
             baseline="unified",
             start=wary.start,
             update=wary.update,
+        ),
+        Baseline(
+            name="margin-perceptron",
+            label="Perceptron with margin",
+            colour="#E69F00",
+            find=margin_perceptron.find,
+        ),
+        Baseline(
+            name="max-margin",
+            label="Maximum margin",
+            colour="#882255",
+            use="marked pairs",
+            find=max_margin.find,
+        ),
+        Baseline(
+            name="bayesian",
+            label="Bayesian IRL",
+            colour="#332288",
+            use="marked pairs",
+            find=bayesian.find,
+        ),
+        Baseline(
+            name="ranking",
+            label="Ranking",
+            colour="#999933",
+            use="whole trajectories",
+            find=ranking.find,
+            needs_incorrect=True,
         ),
     )
 }
