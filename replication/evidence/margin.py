@@ -27,8 +27,14 @@ from replication.errors import UserError
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-TOLERANCE = 1e-9
-"""How far below 1 a constraint may stay, and how much delta is lowered for rounding, relatively."""
+TOLERANCE = 1e-4
+"""How far below 1 a constraint may stay; endless loops can be many, each a little worse than others.
+
+What stays lowers delta, so that it is safe, and exact to this share.
+"""
+
+ROUNDING = 1e-9
+"""By what share delta is lowered for rounding, which is some 1e-13 of the largest value in a plan."""
 
 
 class MarginError(UserError):
@@ -42,7 +48,7 @@ class Margin:
     Attributes
     ----------
     delta
-        A lower bound of the margin, at most 2 TOLERANCE below it, relatively.
+        A lower bound of the margin, by at most TOLERANCE of it.
     weights
         w*, [state, action].
     constraints
@@ -109,7 +115,7 @@ def margin(problem: Problem) -> Margin:
         least, multipliers = least_norm(rows)
         w, rows = least.reshape(shape), rows[multipliers > 0]
     delta = float(slack.min() / np.linalg.norm(w))
-    return Margin(delta * (1 - TOLERANCE), w, len(rows))
+    return Margin(delta * (1 - ROUNDING), w, len(rows))
 
 
 def deviations(problem: Problem) -> Deviations:
