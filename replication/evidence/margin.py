@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 TOLERANCE = 1e-4
-"""How far below 1 a constraint may stay; endless loops can be many, each a little worse than others.
+"""How far below 1 a constraint may stay: there can be ever more ways to loop, each a little better.
 
-What stays lowers delta, so that it is safe, and exact to this share.
+It lowers delta, which so stays safe.
 """
 
 ROUNDING = 1e-9
-"""By what share delta is lowered for rounding, which is some 1e-13 of the largest value in a plan."""
+"""By what share delta is lowered for rounding, which is some 1e-13 of the largest value planned."""
 
 
 class MarginError(UserError):
