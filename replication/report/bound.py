@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from replication.baselines import find_method
-from replication.report.drawing import BLUE, GREEN, INK, VERMILION, handle
+from replication.report.drawing import BLUE, DASHES, GREEN, INK, VERMILION, handle
 from replication.report.picture import Picture
 from replication.report.readable import F_LABELS, interval, readable
 from replication.report.style import canvas, legend_below, settled
@@ -59,20 +59,20 @@ def bounds(table: pd.DataFrame) -> Picture:
 
 @settled
 def draw_bounds(numbers: pd.DataFrame) -> Figure:
-    """Draw mean iterations with intervals against both causes, with the line that each predicts."""
+    """Draw mean iterations with intervals against bound and length; methods stand side by side."""
     numbers = numbers.fillna({"reading": ""})
     figure, axes = canvas(1, 2, height=3.3, sharey=True)
-    causes = ("bound", "length")
-    for panel, name in zip(axes, causes, strict=True):
-        for key, (mark, colour) in LOOKS.items():
+    for panel, name, width in zip(axes, ("bound", "length"), (1.12, 1.04), strict=True):
+        places = np.linspace(-1, 1, len(LOOKS))
+        for place, (key, (mark, colour)) in zip(places, LOOKS.items(), strict=True):
             own = numbers[(numbers[RUN] == list(key)).all(axis=1)]
-            style: dict[str, Any] = {"color": colour, "lw": 0.7, "alpha": 0.45}
-            panel.vlines(own[name], own["low"].clip(lower=1), own["high"], **style)
-            panel.plot(own[name], own["mean"], mark, ms=3.2, color=colour, mew=0, alpha=0.8)
-        ends = np.array([numbers[name].min() / 1.6, numbers[name].max() * 1.6])
-        panel.plot(ends, ends, color="0.5", lw=1, ls=(0, (4, 2)), scalex=False, scaley=False)
+            x = own[name] * width**place
+            panel.vlines(x, own["low"].clip(lower=1), own["high"], color=colour, lw=0.7, alpha=0.45)
+            panel.plot(x, own["mean"], mark, ms=3.2, color=colour, mew=0, alpha=0.8)
         panel.set_xscale("log")
-        panel.set_xlim(*ends)
+        panel.set_xlim(numbers[name].min() / 1.6, numbers[name].max() * 1.6)
+    ends = np.array(axes[1].get_xlim())
+    axes[1].plot(ends, ends, color="0.5", lw=1, ls=DASHES, scalex=False, scaley=False)
     _scale(axes[0], "x", [1e3, 1e4, 1e5, 1e6], power=True)
     _scale(axes[1], "x", [4, 8, 16, 32])
     axes[0].set_yscale("log")
@@ -82,10 +82,10 @@ def draw_bounds(numbers: pd.DataFrame) -> Figure:
     axes[0].set_ylabel("mean iterations (log axis)")
     axes[0].set_xlabel("bound $(R/\\delta)^2$ (log axis)")
     axes[1].set_xlabel("moves of the demonstrated path (log axis)")
-    axes[0].set_title("(a) the bound is far above", size=8.5, loc="left")
-    axes[1].set_title("(b) one iteration for each move", size=8.5, loc="left")
+    axes[0].set_title("(a) against the bound", size=8.5, loc="left")
+    axes[1].set_title("(b) against the length of the path", size=8.5, loc="left")
     handles = [handle(run_label(*key), mark, colour, lw=0) for key, (mark, colour) in LOOKS.items()]
-    handles.append(handle("as many iterations", "", "0.5", ls=(0, (4, 2))))
+    handles.append(handle("one iteration for each move", "", "0.5", ls=DASHES))
     legend_below(figure, handles)
     return figure
 
@@ -107,7 +107,7 @@ AMONG = {"shapes": "shapes (31 or 33 moves)", "all": "shapes and shorter paths"}
 def readable_shares(table: pd.DataFrame) -> pd.DataFrame:
     """Return what margin and length explain, a row each.
 
-    `table` is a :func:`~replication.evidence.bound.share_table`.
+    `table` is a :func:`~replication.evidence.explained.share_table`.
     """
     return readable(
         table,
