@@ -16,7 +16,7 @@ n^2 delta^2 <= n R^2. QED
 The largest delta is the margin, see :mod:`replication.evidence.margin`. R^2 is
 |mu_E|^2 + 1 / (1 - gamma)^2: visits are not negative and sum to at most 1 / (1 - gamma), so
 |mu_E - mu|^2 <= |mu_E|^2 + |mu|^2 <= R^2; an agent that runs into a wall beside the start for ever
-reaches it, unless it is the expert who does.
+reaches it.
 
 Three things keep the agent from being exactly best. Its episode is cut at the horizon: what is
 behind it is worth at most gamma^500 = 1e-23 of what is before. Actions tie within a relative

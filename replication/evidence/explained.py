@@ -1,4 +1,4 @@
-"""What explains the iterations: the margin of the bound, or the plain length of the path?"""
+"""What explains the iterations: the margin of the bound, and the plain length of the path."""
 
 from __future__ import annotations
 
