@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from replication.evidence.explained import share_table
+
+
+def test_shares_by_hand() -> None:
+    """What follows one cause exactly is explained by it, and by the other as far as they agree."""
+    rng = np.random.default_rng(np.random.SeedSequence(6))
+    n = 40
+    delta, length = rng.uniform(0.01, 0.1, n), rng.integers(4, 30, n)
+    table = pd.DataFrame(
+        {
+            "method": "perceptron",
+            "reading": "",
+            "solver": "planning",
+            "vary": np.where(np.arange(n) < 25, "shape", "length"),
+            "delta": delta,
+            "length": length,
+            "mean": 3 * delta**-0.5 * np.exp(rng.normal(0, 0.3, n)),
+        }
+    )
+    shares = share_table(table).set_index(["among", "cause"])
+    assert shares["cases"].tolist() == [25, 25, 40, 40]
+    row = shares.loc["all", "margin"]
+    x, y = np.log(delta**-2.0), np.log(table["mean"])
+    slope, constant = np.polyfit(x, y, 1)
+    explained = 1 - ((y - constant - slope * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
+    assert (row["share"], row["slope"]) == pytest.approx((explained, slope))
+    # Fisher's interval, as SciPy has it
+    ends = stats.pearsonr(x, y).confidence_interval(0.95)
+    assert (row["low"], row["high"]) == pytest.approx((ends.low**2, ends.high**2), rel=1e-6)
+    right = [
+        (delta[i] < delta[j]) == (y[i] > y[j])
+        for i in range(n)
+        for j in range(i)
+        if delta[i] != delta[j]
+    ]
+    assert (row["pairs"], row["right"]) == (len(right), pytest.approx(np.mean(right)))
+    other = shares.loc["all", "length"]
+    assert other["low"] == 0 < other["share"] < other["high"]
+    assert other["pairs"] == sum(length[i] != length[j] for i in range(n) for j in range(i))
