@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from replication.baselines import one_line, perceptron, wary
+from replication.baselines import from_failure, max_entropy, one_line, perceptron, wary
 from replication.baselines.baseline import Baseline
 from replication.errors import unknown
 from replication.irl import METHODS, Method
@@ -37,6 +37,19 @@ BASELINES: dict[str, Baseline] = {
             use="marked pairs",
             start=wary.start,
             update=wary.update,
+        ),
+        Baseline(
+            name="max-entropy",
+            label="Maximum causal entropy",
+            colour="#E69F00",
+            find=max_entropy.find,
+        ),
+        Baseline(
+            name="from-failure",
+            label="IRL from failure",
+            colour="#882255",
+            use="whole trajectories",
+            find=from_failure.find,
         ),
     )
 }
