@@ -6,17 +6,18 @@ mu_F. For the visits mu of the soft-optimal policy of the sum,
 
     mu_E - mu = RIDGE w_S,    mu - mu_F = SCALE w_F.
 
-Their Algorithm 1 steps along the gradient of w_S, sets w_F, and lowers the scale (their lambda) to a
-floor, in turn. Here all pairs are features, and failures begin where successes do; so both compare
-the same visits, and adding the two equations leaves a single one, of w = w_S + w_F,
+Their Algorithm 1 steps along the gradient of w_S, sets w_F, and lowers the scale (their lambda) to
+a floor, in turn. Here all pairs are features, and failures begin where successes do. So both
+compare the same visits, and the two equations add up to a single one, of w = w_S + w_F,
 
     target - mu = ridge w,    ridge = RIDGE SCALE / (SCALE - RIDGE),
                               target = mu_E + ridge / SCALE (mu_E - mu_F),
 
 which is maximum entropy with a target that lies a little beyond mu_E, as seen from mu_F. Its
-likelihood is concave if RIDGE < SCALE. So there is one solution, wherever annealing begins, and it
-is climbed to directly. The term in RIDGE is ours; without it, an expert that is matched exactly
-leaves nothing to failures.
+likelihood is concave if RIDGE < SCALE, so there is one solution, and it is climbed to directly.
+Where Algorithm 1 settles, it settles there; on a small maze, with gamma = 0.9 and a scale of 1, it
+did not settle with steps of 0.01 either. The term in RIDGE is ours; without it, an expert that is
+matched exactly leaves nothing to failures.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ likelihood of the demonstrations,
 
     L(w) = w . mu_E - V(start) - ridge / 2 |w|^2,    whose gradient is    mu_E - mu_pi - ridge w.
 
-L is concave. Its last term is ours: where a demonstration never varies, weights would grow for ever.
+L is concave. Its last term is ours: where a demonstration never varies, weights would grow without
+end.
 """
 
 from __future__ import annotations
