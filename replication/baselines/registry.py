@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from replication.baselines import (
     bayesian,
+    from_failure,
     margin_perceptron,
+    max_entropy,
     max_margin,
     mwal,
     one_line,
@@ -74,6 +76,19 @@ BASELINES: dict[str, Baseline] = {
             colour="#882255",
             use="marked pairs",
             find=max_margin.find,
+        ),
+        Baseline(
+            name="max-entropy",
+            label="Maximum causal entropy",
+            colour="#661100",
+            find=max_entropy.find,
+        ),
+        Baseline(
+            name="from-failure",
+            label="IRL from failure",
+            colour="#AA4499",
+            use="whole trajectories",
+            find=from_failure.find,
         ),
         Baseline(
             name="bayesian",
