@@ -1,8 +1,8 @@
 """A perceptron with a few features that mean the same in any maze.
 
-One-hot features learn a number for each pair of cell and move, which says nothing of a cell that was
-never visited. Here the reward is w(s, a) = theta . phi(s, a): five numbers are learned, and phi is
-computed anew wherever the reward is used.
+One-hot features learn a number for each pair of cell and move, which says nothing of a cell that
+was never visited. Here the reward is w(s, a) = theta . phi(s, a): five numbers are learned, and phi
+is computed anew wherever the reward is used.
 """
 
 from __future__ import annotations

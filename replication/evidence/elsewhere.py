@@ -61,7 +61,11 @@ class World:
 
         It is the sum of true rewards over the policy's discounted visits.
         """
-        return float(STEP * sweeps.visits(self.moves, policy, gamma=GAMMA).sum())
+        return float(STEP * self.visits(policy).sum())
+
+    def visits(self, policy: Array) -> Array:
+        """Return the discounted visits mu [state, action] of a policy (Eq. 7)."""
+        return sweeps.visits(self.moves, policy, gamma=GAMMA)
 
     def lost(self, policy: Array) -> float:
         """Return the value lost: (V* - V) / (V* - V_random), of means over the starts.
