@@ -58,7 +58,7 @@ def features(maze: Maze) -> Array:
     """
     there = maze.cells(maze.next_state.ravel()).reshape(*maze.next_state.shape, 2)
     most = np.maximum(np.array(maze.shape) - 1, 1)
-    away = np.abs(there - np.array(maze.cell(maze.goal))).sum(axis=2) / most.sum()
+    away = np.abs(there - np.array(maze.cell(maze.goal))).sum(axis=2) / (sum(maze.shape) - 2)
     bump = maze.next_state == np.arange(maze.n_states)[:, None]
     beside = bump[:, BESIDE].mean(axis=2)
     return np.dstack([there / most, away, bump, beside])
