@@ -13,8 +13,8 @@ and cap. All numbers of the design are below and were fixed before the run:
 ``sizes``
     Mazes with ever longer sides, from corner to corner, and what they cost.
 
-In `paths` and `noise` each trial has demonstrations of its own, drawn from a fixed root, and the
-same stream to learn from. A size has few trials, since they take longest.
+In the first two each trial has its own demonstrations and the same stream to learn from. A size has
+few trials, since they take longest.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ METHODS = ("one-line", "perceptron", "unified")
 d: on longer ones the agent would be through before the goal."""
 
 NEAR = 1e-9
-"""Distances that differ by less are equal: the threshold of d."""
+"""Distances that differ by less are equal."""
 
 
 class Setting(NamedTuple):
@@ -135,9 +135,11 @@ def paths_table(trials: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         One row for each number of demonstrations and of rollouts: `n` trials; means with their 95 %
-        intervals of `d`, the least of a trial, and of `at`, the iteration of it; `shortest` and
-        `demo`, the means of :func:`nearest` and :func:`nearest_demo`; the shares of trials that
-        come as near as `shortest` (`reached`), nearer (`nearer`), and to zero (`zero`).
+        intervals of `d`, the least of a trial, and of `learned`, the least after an update; `at`,
+        the iteration of d, its median with the quartiles; `shortest` and `demo`, the means of
+        :func:`nearest` and :func:`nearest_demo`; the shares of trials that
+        come as near as `shortest` (`reached`), nearer (`nearer`), and to zero (`zero`), and that
+        were nearest before they learned anything (`untrained`).
     """
     rows = []
     for (number, rollouts), own in _points(trials, "paths", ["value", "rollouts"]):
@@ -150,13 +152,17 @@ def paths_table(trials: pd.DataFrame) -> pd.DataFrame:
         rows.append(
             {"number": int(number), "rollouts": int(rollouts), "n": len(own)}
             | _mean("d", least)
-            | _mean("at", at)
+            | dict(
+                zip(("at", "at_low", "at_high"), np.quantile(at, [0.5, 0.25, 0.75]), strict=True)
+            )
+            | _mean("learned", np.array([d[1:].min() for d in histories]))
             | {
                 "shortest": shortest.mean(),
                 "demo": np.mean([nearest_demo(one, gamma=gamma) for one in demos]),
                 "reached": (least <= shortest + NEAR).mean(),
                 "nearer": (least < shortest - NEAR).mean(),
                 "zero": own["converged"].mean(),
+                "untrained": (at == 0).mean(),
             }
         )
     return pd.DataFrame(rows)
@@ -169,8 +175,8 @@ def noise_table(trials: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         One row for each level: `n` trials; `share` of them that end at d = 0 within the cap, with
-        its 95 % interval; the median of their `iterations`, in which one that does not counts with
-        the cap; the mean `d`, the least of a trial, with its interval; `against`, the trials whose
+        its 95 % interval; the median of `iterations`, with the cap for those that do not; the mean
+        `d`, the least of a trial, with its interval; `against`, the trials whose
         demonstration contradicts itself, and `against_zero`, those of them at d = 0;
         `contradictory`, the share of LOOKED_AT demonstrations that do, with its interval.
     """
@@ -213,17 +219,6 @@ def sizes_table(trials: pd.DataFrame) -> pd.DataFrame:
             | {"episode": steps.sum() / iterations.sum() / Params().learner.episodes}
         )
     return pd.DataFrame(rows)
-
-
-def growth(table: pd.DataFrame) -> dict[str, float]:
-    """Return by method the power of the number of cells with which the steps grow.
-
-    It is the slope of a straight line through the logarithms of a :func:`sizes_table`.
-    """
-    return {
-        str(method): float(np.polyfit(np.log(rows["cells"]), np.log(rows["steps"]), 1)[0])
-        for method, rows in table.groupby("method", sort=False)
-    }
 
 
 MEASURES = ("trial", "iterations", "steps", "converged", "errors")

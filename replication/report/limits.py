@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -11,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator, PercentFormatter
 
 from replication.baselines import find_method
-from replication.evidence.limits import growth
 from replication.report.drawing import INK, VERMILION, handle
 from replication.report.picture import Picture
 from replication.report.readable import interval, readable
@@ -20,6 +20,9 @@ from replication.report.style import canvas, legend_below, settled
 DESIGNS = ("paths", "noise", "sizes")
 
 ROLLOUT_MARKS = {1: ("o", INK), 100: ("s", VERMILION)}
+METHOD_MARKS = {"one-line": ("^", 1.0), "perceptron": ("s", 0.93), "unified": ("o", 1.07)}
+"""Mark of a method, and how far it is moved from its number of cells."""
+
 SHARE_MARKS = {"share": ("o", INK), "contradictory": ("D", VERMILION)}
 
 
@@ -30,18 +33,20 @@ def limits(paths: pd.DataFrame, noise: pd.DataFrame, sizes: pd.DataFrame) -> Pic
     """
     tables = zip(DESIGNS, (paths, noise, sizes), strict=True)
     numbers = pd.concat([table.assign(design=name) for name, table in tables], ignore_index=True)
-    single = paths[paths["rollouts"] == 1]
+    single, many = (paths[paths["rollouts"] == rollouts] for rollouts in ROLLOUT_MARKS)
     near = ", ".join(f"{row.d:.2f} with {row.number}" for row in single.itertuples())
+    start = ", ".join(f"{row.untrained:.0%} with {row.number}" for row in many.itertuples())
     shares = ", ".join(f"{row.share:.0%} at {row.level:g}" for row in noise.itertuples())
     powers = ", ".join(
-        f"{find_method(name).label}: cells to the power of {power:.2f}"
-        for name, power in growth(sizes).items()
+        f"{find_method(name).label}: {power:.2f}" for name, power in growth(sizes).items()
     )
     return Picture(
         numbers,
         draw_limits,
-        f"Least d by the number of different correct demonstrations: {near}. Trials that end at "
-        f"zero by the probability of a slip: {shares}. Steps grow with the maze as, {powers}.",
+        f"Least d by the number of different correct demonstrations: {near}; with "
+        f"{many['rollouts'].iloc[0]} trajectories it is that of the untrained agent in "
+        f"{start}. Trials that end at zero by the probability of a slip: {shares}. "
+        f"Steps grow with this power of the number of cells: {powers}.",
     )
 
 
@@ -55,6 +60,8 @@ def draw_limits(numbers: pd.DataFrame) -> Figure:
     for shift, (rollouts, look) in zip((-0.12, 0.12), ROLLOUT_MARKS.items(), strict=True):
         rows = paths[paths["rollouts"] == rollouts]
         _marks(left, rows["number"] + shift, rows, "d", look)
+        later = rows[rows["untrained"] > 0]
+        left.plot(later["number"] + shift, later["learned"], look[0], ms=4, color=look[1], mfc="w")
     left.set_xticks(single["number"], single["number"].astype(int))
     left.set_ylim(0, None)
     _name(left, "(a) demonstrations that differ", "correct demonstrations", "least d")
@@ -68,10 +75,11 @@ def draw_limits(numbers: pd.DataFrame) -> Figure:
 
     right.set(xscale="log", yscale="log", ylim=(sizes["steps"].min() / 2, 3 * sizes["steps"].max()))
     for method, rows in sizes.groupby("method", sort=False):
-        look = "^", find_method(str(method)).colour
-        _marks(right, rows["cells"], rows, "steps", look, lw=0.8)
+        mark, shift = METHOD_MARKS[str(method)]
+        look = mark, find_method(str(method)).colour
+        _marks(right, shift * rows["cells"], rows, "steps", look, lw=0.8)
         short = rows[rows["zero"] < 1]
-        right.plot(short["cells"], short["steps"], "^", ms=4, color=look[1], mfc="white", zorder=3)
+        right.plot(shift * short["cells"], short["steps"], mark, ms=4, color=look[1], mfc="w")
     ticks = [25, 100, 900, 10_000]
     right.set_xticks(ticks, [f"{tick:,}" for tick in ticks], size=7.5)
     right.xaxis.set_minor_locator(NullLocator())
@@ -96,22 +104,38 @@ def _name(panel: Axes, title: str, x: str, y: str) -> None:
     panel.set_ylabel(y, size=8)
 
 
+def growth(table: pd.DataFrame) -> dict[str, float]:
+    """Return by method the power of the number of cells with which the steps grow.
+
+    It is the slope of a straight line through the logarithms of a sizes table.
+    """
+    return {
+        str(method): float(np.polyfit(np.log(rows["cells"]), np.log(rows["steps"]), 1)[0])
+        for method, rows in table.groupby("method", sort=False)
+    }
+
+
 def _handles(paths: pd.DataFrame, noise: pd.DataFrame, sizes: pd.DataFrame) -> list[Artist]:
     """Return the entries of the legend, panel by panel."""
     handles = [
         handle(f"(a) {rollouts} trajector{'y' if rollouts == 1 else 'ies'} an iteration", *look)
         for rollouts, look in ROLLOUT_MARKS.items()
     ]
+    handles.append(handle("(a) the same, after an update", "s", VERMILION, mfc="white", lw=0))
     handles.append(handle("(a) the nearest shortest path", "_", "0.45", ms=12, mew=1.5, lw=0))
     handles.append(handle("(b) trials that end at d = 0", *SHARE_MARKS["share"]))
     text = "(b) demonstrations with two actions in a state"
     handles.append(handle(text, *SHARE_MARKS["contradictory"]))
     handles += [
-        handle(f"(c) {find_method(name).label.partition(',')[0]}", "^", find_method(name).colour)
+        handle(
+            f"(c) {find_method(name).label.partition(',')[0]}",
+            METHOD_MARKS[name][0],
+            find_method(name).colour,
+        )
         for name in dict.fromkeys(sizes["method"])
     ]
     if (sizes["zero"] < 1).any():
-        handles.append(handle("(c) not all at d = 0", "^", "0.4", mfc="white", lw=0))
+        handles.append(handle("(c) not all at d = 0", "o", "0.4", mfc="white", lw=0))
     n = int(paths["n"].max()), int(noise["n"].max()), int(sizes["n"].max())
     text = f"95 % intervals; {n[0]} trials in (a), {n[1]} in (b), {n[2]} in (c)"
     handles.append(handle(text, "|", "0.4", lw=0, ms=9))
@@ -127,11 +151,17 @@ def readable_paths(table: pd.DataFrame) -> pd.DataFrame:
             "Trajectories": lambda row: row.rollouts,
             "Trials": lambda row: row.n,
             "Least d [95 %]": lambda row: interval(row.d, row.d_low, row.d_high),
-            "In iteration": lambda row: interval(row.at, row.at_low, row.at_high),
+            "In iteration (quartiles)": lambda row: (
+                f"{row.at:g} ({row.at_low:g}\N{EN DASH}{row.at_high:g})"
+            ),
+            "Least d after learning": lambda row: interval(
+                row.learned, row.learned_low, row.learned_high
+            ),
             "Nearest demonstration": lambda row: f"{row.demo:.2f}",
             "Nearest shortest path": lambda row: f"{row.shortest:.2f}",
             "As near as that": lambda row: f"{row.reached:.0%}",
             "Nearer": lambda row: f"{row.nearer:.0%}",
+            "Before learning": lambda row: f"{row.untrained:.0%}",
             "At d = 0": lambda row: f"{row.zero:.0%}",
         },
     )
