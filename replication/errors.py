@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from typing import Any
 
 EXTRAS = {
-    "notebooks": ("ipykernel", "joblib", "nbformat", "packaging", "papermill", "scipy"),
+    "notebooks": ("ipykernel", "joblib", "nbformat", "packaging", "papermill"),
     "cluster": ("distributed", "joblib"),
     "site": ("bs4", "jinja2", "myst_nb", "sphinx", "yaml"),
     "minari": ("h5py", "minari"),

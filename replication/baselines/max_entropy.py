@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from replication.baselines.problem import Problem
-from replication.errors import need
 
 Array = NDArray[np.float64]
 
@@ -34,21 +34,12 @@ which is `TOLERANCE` / `RIDGE`."""
 
 
 def find(problem: Problem) -> Array:
-    """Return the weights that maximise L, [state, action].
-
-    Raises
-    ------
-    UserError
-        If scipy is not installed.
-    """
+    """Return the weights that maximise L, [state, action]."""
     return climb(problem, problem.mu_e, ridge=RIDGE)
 
 
 def climb(problem: Problem, target: Array, *, ridge: float) -> Array:
     """Return the weights that maximise L if `target` [state, action] stands in place of mu_E."""
-    need("notebooks")
-    from scipy.optimize import minimize
-
     q = np.zeros(target.shape)
 
     def loss(flat: Array) -> tuple[float, Array]:

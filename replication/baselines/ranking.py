@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import expit, log_expit
 
 from replication.baselines.problem import Problem
-from replication.errors import need
 from replication.irl.expectations import feature_expectations
 
 Array = NDArray[np.float64]
@@ -31,16 +32,7 @@ TOLERANCE = 1e-9
 
 
 def find(problem: Problem) -> Array:
-    """Return the weights that rank the demonstrations, [state, action].
-
-    Raises
-    ------
-    UserError
-        If scipy is not installed.
-    """
-    need("notebooks")
-    from scipy.optimize import minimize
-
+    """Return the weights that rank the demonstrations, [state, action]."""
     differences = gains(problem)
     start = np.zeros(differences.shape[1])
     limits = {"gtol": TOLERANCE, "ftol": 0.0, "maxiter": 10_000, "maxfun": 10_000}
@@ -62,8 +54,6 @@ def gains(problem: Problem) -> Array:
 
 def loss(w: Array, differences: Array) -> tuple[float, Array]:
     """Return what is minimised, and its gradient, for weights [state * action]."""
-    from scipy.special import expit, log_expit
-
     ahead = differences @ w
     value = RIDGE / 2 * (w @ w) - log_expit(ahead).sum()
     return float(value), RIDGE * w - expit(-ahead) @ differences
