@@ -189,6 +189,22 @@ def test_nearest_by_brute_force(ways: list[list[int]]) -> None:
     assert nearest_demo(demos, gamma=GAMMA) == pytest.approx(min(every[tuple(w)] for w in ways))
 
 
+EVERY = [
+    [UP if t in ups else RIGHT for t in range(6)] for ups in combinations(range(6), 3)
+]  # of a room of 4 x 4
+
+
+@pytest.mark.parametrize("root", range(40))
+def test_nearest_of_every_shortest_path(root: int) -> None:
+    """Where several share some of their way, the nearest may be none of them."""
+    room = Maze.from_text("...G\n....\n....\nS...")
+    chosen = np.random.default_rng(np.random.SeedSequence(root)).permutation(20)[: 3 + root % 5]
+    ways = [EVERY[at] for at in chosen]
+    mu_e = np.mean([mu(room, way) for way in ways], axis=0)
+    least = min(float(np.linalg.norm(mu_e - mu(room, way))) for way in EVERY)
+    assert nearest(shown(room, *ways), gamma=GAMMA) == pytest.approx(least)
+
+
 @settings(max_examples=100)
 @given(mazes(), st.integers(1, 5), st.integers(0, 1000))
 def test_nearest_is_no_farther_than_a_demonstration(maze: Maze, number: int, root: int) -> None:

@@ -110,7 +110,7 @@ def made_up() -> pd.DataFrame:
         " ".join(
             [
                 "0.1" if at % 11 == 0 and not zero else "4",
-                "2",
+                "0.3" if at % 7 == 0 and not zero else "2",
                 *["3"] * (at % 5),
                 "0" if zero else "0.5",
                 *([] if zero else ["1"]),
