@@ -11,7 +11,7 @@ from replication.paper.params import Update
 from replication.paper.register import ChoiceError
 
 EVERY = [*METHODS.values(), *BASELINES.values()]
-PAGE = PROJECT / "docs" / "beyond.md"
+PAGE = PROJECT / "docs" / "methods.md"
 
 
 def test_each_method_can_be_told_from_the_others() -> None:
@@ -49,8 +49,10 @@ def test_a_misspelt_method_is_refused_with_the_list() -> None:
     assert all(method.name in str(caught.value) for method in EVERY)
 
 
-@pytest.mark.skipif(not PAGE.exists(), reason="the page is not written yet")
-def test_the_page_lists_each() -> None:
-    """The page on baselines names each of them."""
-    page = PAGE.read_text(encoding="utf-8")
-    assert [name for name in BASELINES if f"`{name}`" not in page] == []
+def test_the_page_of_methods_lists_each() -> None:
+    """It has a row for each baseline and no other, with the use of incorrect demonstrations."""
+    rows = re.findall(
+        r"^\| `([a-z-]+)` \|.*\| ([a-z ]+) \|$", PAGE.read_text("utf-8"), re.MULTILINE
+    )
+    said = {name: use.replace("none", "nothing") for name, use in rows}
+    assert said == {name: method.use for name, method in BASELINES.items()}
