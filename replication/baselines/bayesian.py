@@ -40,11 +40,11 @@ than one in a hundred are taken, exp(-10 / 2)."""
 STEP = 1.0
 """The standard deviation of a move: that of a reward before any demonstration."""
 
-LENGTH = 100_000
-"""Number of moves. On 20 x 20 cells the half that goes anywhere tries each pair some 30 times, and
-the other half those in the states of demonstrations at least as often again. That is what some
-seconds allow, and too little for the mean of each weight: between chains with other roots, weights
-off the expert's way differ by some 0.45. Larger tasks would need more moves."""
+LENGTH = 20_000
+"""Number of moves. On 20 x 20 cells the half that goes anywhere tries each pair some 6 times, and
+the other half those in the states of demonstrations several times as often. That is what a second
+allows, and too little for the mean of each weight: even between chains of five times that length,
+with other roots, weights off the expert's way differ by some 0.45."""
 
 ROOT = 2007
 """Root seed of the chain."""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from replication import Demos, save_demos
-from replication.evidence import calibration, comparison, rounding, sweep
+from replication.evidence import bound, calibration, comparison, limits, rounding, sweep
 from replication.evidence.experiments import EXPERIMENTS, Experiment
 from replication.evidence.recompute import declared_condition, recompute_trials, sampled
 from replication.evidence.tables import write_csv
@@ -178,6 +178,8 @@ def planned() -> list[Group]:
         Group([finalist], 1, {"part": "final", "number": 77}),
         *rounding.plan(1)[:4],
         *comparison.plan(1)[::9],
+        *bound.plan(1)[::9],
+        *limits.plan(1)[::9],
     ]
 
 
@@ -186,7 +188,7 @@ def test_conditions_of_all_parts_come_back() -> None:
     groups = planned()
     assert {group.labels["part"] for group in groups} == {
         *sweep.TRIALS,
-        *("screen", "final", "rounding", "comparison"),
+        *("screen", "final", "rounding", "comparison", "bound", "limits"),
     }
     for group in groups:
         table = planned_table([group], 7)
@@ -202,7 +204,7 @@ def test_conditions_of_all_parts_come_back() -> None:
     [
         *(("mazes", "-1"), ("mazes", "1000"), ("numbers", "99"), ("unheard", "0")),
         *(("screen", "480"), ("final", "480"), ("fits", "960"), ("fits", "-1"), ("rounding", "90")),
-        ("comparison", "999"),
+        *(("comparison", "999"), ("bound", "999")),
     ],
 )
 def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:

@@ -64,32 +64,32 @@ def test_a_new_method_is_one_row(
     small_demos: Demos, store_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A perceptron, which moves each weight by its residual, is in every table and picture."""
-    perceptron = replace(
+    another = replace(
         METHODS["adaboost"],
-        name="perceptron",
-        label="Perceptron",
+        name="another",
+        label="Another",
         colour="#009E73",
         baseline="adaboost",
         start=lambda shape, params: np.ones(shape),
         update=lambda w, f, mu_e, mu_i, mu_b, params: (w + f * (mu_e - mu_i), f),
     )
-    monkeypatch.setitem(METHODS, perceptron.name, perceptron)
-    assert fit(small_demos, method="perceptron", seed=1).errors[-1] == 0
+    monkeypatch.setitem(METHODS, another.name, another)
+    assert fit(small_demos, method="another", seed=1).errors[-1] == 0
 
     conditions = conditions_of(small_demos, {"episodes": 60, "horizon": 40}, METHODS)
     every = list(conditions.values())
     results = run_trials(every, trials=3, store=Store(store_path), seed=1)
     trials = measure_trials(results, every, errors=True)
-    assert (trials["method"] == "perceptron").sum() == 3
+    assert (trials["method"] == "another").sum() == 3
     summary = summary_table(trials, {}).set_index("method")
-    assert summary.loc["perceptron", "n"] == 3
-    (compared,) = contrasts_table(trials).query("x == 'perceptron'").itertuples()
+    assert summary.loc["another", "n"] == 3
+    (compared,) = contrasts_table(trials).query("x == 'another'").itertuples()
     assert (compared.reading, compared.set) == ("", "none")
     assert (compared.y, compared.n) == ("adaboost", 3)
     for picture in (
         errors.falling(trials, {}),
         iterations.per_trial(trials, {}),
     ):
-        assert "Perceptron: " in picture.words
+        assert "Another: " in picture.words
         texts = shown_texts(picture.draw(picture.numbers))
-        assert "Perceptron" in [text.get_text() for text in texts]
+        assert "Another" in [text.get_text() for text in texts]
