@@ -22,8 +22,8 @@ reproduce: $(VENV)/.ready ## run the three tasks, judge each claim, build the si
 	$(VENV)/bin/replicate run open_maze obstacle_maze soccer claims --here --check; status=$$?; \
 	    $(VENV)/bin/replicate site && exit $$status
 
-sensitivity: $(VENV)/.ready ## what the verdicts depend on: the claims under hundreds of other choices
-	$(VENV)/bin/replicate run rounding calibration sensitivity --here --check
+sensitivity: $(VENV)/.ready ## what the verdicts depend on, and what the idea is worth beside others
+	$(VENV)/bin/replicate run beyond rounding calibration sensitivity --here --check
 
 site: $(VENV)/.ready ## build the report from what is published in figures/, into build/site
 	$(VENV)/bin/replicate site

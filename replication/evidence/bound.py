@@ -5,17 +5,17 @@ w_0 = 0, and while the agent's trajectory is not the expert's, w_(i+1) = w_i + m
 mu_i has the greatest w_i . mu of all trajectories.
 
 Theorem (Novikoff 1962; Collins 2002, theorem 1). If for every other trajectory
-|mu_E - mu| <= R, and u . (mu_E - mu) >= delta > 0 with some u of norm 1, then there are at most
+‖mu_E - mu‖ <= R, and u . (mu_E - mu) >= delta > 0 with some u of norm 1, then there are at most
 (R / delta)^2 updates, whatever is taken among equals.
 
 Proof. Let r_i = mu_E - mu_i. Each update moves the weights along u by u . r_i >= delta, so after n
-of them |w_n| >= u . w_n >= n delta. As mu_i is best under w_i, w_i . r_i <= 0, so
-|w_(i+1)|^2 = |w_i|^2 + 2 w_i . r_i + |r_i|^2 <= |w_i|^2 + R^2, and |w_n|^2 <= n R^2. Together
+of them ‖w_n‖ >= u . w_n >= n delta. As mu_i is best under w_i, w_i . r_i <= 0, so
+‖w_(i+1)‖^2 = ‖w_i‖^2 + 2 w_i . r_i + ‖r_i‖^2 <= ‖w_i‖^2 + R^2, and ‖w_n‖^2 <= n R^2. Together
 n^2 delta^2 <= n R^2. QED
 
 The largest delta is the margin, see :mod:`replication.evidence.margin`. R^2 is
-|mu_E|^2 + 1 / (1 - gamma)^2: visits are not negative and sum to at most 1 / (1 - gamma), so
-|mu_E - mu|^2 <= |mu_E|^2 + |mu|^2 <= R^2; an agent that runs into a wall beside the start for ever
+‖mu_E‖^2 + 1 / (1 - gamma)^2: visits are not negative and sum to at most 1 / (1 - gamma), so
+‖mu_E - mu‖^2 <= ‖mu_E‖^2 + ‖mu‖^2 <= R^2; an agent that runs into a wall beside the start for ever
 reaches it.
 
 Three things keep the agent from being exactly best. Its episode is cut at the horizon: what is
@@ -139,7 +139,7 @@ def problem_of(demos: Demos) -> Problem:
 
 
 def radius(problem: Problem) -> float:
-    """Return R, which no |mu_E - mu| exceeds."""
+    """Return R, which no ‖mu_E - mu‖ exceeds."""
     return float(np.sqrt((problem.mu_e**2).sum() + (1 - problem.gamma) ** -2.0))
 
 

@@ -4,7 +4,7 @@ For a demonstration with feature expectations mu_E it is the largest delta for w
 
     u . (mu_E - mu) >= delta    for the mu of every other trajectory,
 
-which is the distance of mu_E from the convex hull of all other mu. It is delta = 1 / |w*|, where w*
+which is the distance of mu_E from the convex hull of all other mu. It is delta = 1 / ‖w*‖, where w*
 has the least norm among all w with w . (mu_E - mu) >= 1. There are more trajectories than can be
 listed, so this quadratic program is solved by constraint generation: each other trajectory leaves
 the demonstrated one at some step t by some other action, and is free from then on. Of those that
@@ -92,7 +92,7 @@ def margin(problem: Problem) -> Margin:
     Notes
     -----
     `delta` is a lower bound whatever the quadratic program is worth: any weights w have it as
-    min w . (mu_E - mu) / |w|, and the minimum is found by planning. The program without the
+    min w . (mu_E - mu) / ‖w‖, and the minimum is found by planning. The program without the
     constraints that are missing has a larger margin, so the two enclose it.
 
     The least norm is a least-distance problem, and is solved as nonnegative least squares (Lawson &

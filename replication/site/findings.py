@@ -129,6 +129,7 @@ def numbers(figures: Path) -> dict[str, Any]:
         "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
         "general_size": _consistency(compared[in_general]),
         "set_labels": SET_LABELS,
+        "methods": by_key(read("beyond/methods"), "solver", "task", "method", "reading", "set"),
         "p": p_is,
         "depends": at_once(factorial),
         "chance": chance(factorial),
@@ -205,13 +206,7 @@ def _size(row: Any) -> str:
 
 
 def by_key(table: pd.DataFrame, *keys: str) -> dict[str, Any]:
-    """Return the rows of a table in nested dictionaries, one level for each key.
-
-    Examples
-    --------
-    >>> by_key(pd.DataFrame({"id": ["A"], "reading": ["printed"], "n": [3]}), "id", "reading")
-    {'A': {'printed': {'id': 'A', 'reading': 'printed', 'n': 3}}}
-    """
+    """Return the rows of a table in nested dictionaries, one level for each key."""
     nested: dict[str, Any] = {}
     for row in table.to_dict("records"):
         place = nested

@@ -15,6 +15,7 @@ from typing import Any
 from replication.files import read_json
 from replication.paper.register import load_choices
 from replication.report.outputs import TRIALS
+from replication.site.reference import source_of
 
 LARGE = 100_000
 """Bytes of a table above which the report has it compressed."""
@@ -56,7 +57,7 @@ class Origin:
         file = f"figures/{self.notebook}/{csv.name}"
         parts = [
             _download("CSV", f"{file}.xz" if packed(csv) else file) if csv.exists() else "",
-            f"{{py:func}}`code <{code}>`" if code else "",
+            f'<a href="{source_of("py", _drawing(code))}">code</a>' if code else "",
         ]
         return " · ".join(filter(None, parts))
 
@@ -64,6 +65,12 @@ class Origin:
         """Return the caption of a figure, or its words if it has none."""
         text = self.captions.get(name)
         return text.format(**self.parameters) if text else _escaped(words)
+
+
+def _drawing(code: str) -> dict[str, str]:
+    """Return the module and the name of what drew a figure."""
+    module, _, name = code.rpartition(".")
+    return {"module": module, "fullname": name}
 
 
 def packed(path: Path) -> bool:

@@ -49,10 +49,11 @@ def _shorten(app: Sphinx, what: str, name: str, thing: Any, *_: Any) -> tuple[st
 
 
 def _write_code(app: Sphinx, error: Exception | None) -> None:
-    """Write the code that the reference links to beside the pages, as text that a browser shows."""
+    """Write the code that pages link to beside them, as text that a browser shows."""
     documented = app.env.domains["py"].data["objects"]
     for path in files.PROJECT.glob("replication/**/*.py"):
         name = path.relative_to(files.PROJECT)
         module = ".".join(name.with_suffix("").parts).removesuffix(".__init__")
-        if any(entry.startswith(f"{module}.") for entry in documented):
+        named = module.startswith("replication.report.")  # under a figure
+        if named or any(entry.startswith(f"{module}.") for entry in documented):
             write_file(Path(app.outdir) / "code" / f"{name.as_posix()}.txt", read_file(path))

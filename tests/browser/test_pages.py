@@ -34,7 +34,7 @@ READ = (
     *("architecture", "api/index", "cite"),
     *PLAYERS,
     *("notebooks/method", "notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
-    *("notebooks/rounding", "round_1"),
+    *("notebooks/beyond", "notebooks/rounding", "round_1"),
 )
 """Every page that is written for readers; others list code."""
 
@@ -192,7 +192,9 @@ def test_every_figure_is_traced(site: Path) -> None:
         for figure in figures:
             text = figure.get_text(" ", strip=True)
             assert "CSV" in text, (name, text)
-            assert "code" in text, (name, text)
+            (code,) = (link for link in figure.select("a") if link.get_text() == "code")
+            file = str(code["href"]).partition("#")[0]
+            assert (site / name).parent.joinpath(file).resolve().is_file(), (name, file)
         assert main.get_text().count("Root seed") == (name != "notebooks/claims")
         assert len(main.select("a[href$='.ipynb']")) == 1
 

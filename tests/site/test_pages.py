@@ -9,6 +9,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 
 from replication.paper.register import load_choices
 from replication.site.pages import Origin, anchor, link_choices, link_pages, page
+from replication.site.reference import source_of
 
 TABLE = "| a   | b   |\n| --- | --- |\n| 1   | 2   |\n"
 PARAMETERS = {"seed": 7, "trials": 3, "choices": {}, "jobs": 2}
@@ -52,7 +53,8 @@ def test_a_figure_is_described_and_traced(folder: Path) -> None:
     assert ":alt: d falls [to 0] at once\n" in text
     assert "\n\nd falls \\[to 0\\] at once\n\n" in text
     assert "`CSV <../figures/toy/fig05.csv>`" in text
-    assert text.rstrip("`\n").endswith(f"{{py:func}}`code <{code}>")
+    address = source_of("py", {"module": "replication.report.errors", "fullname": "draw"})
+    assert text.rstrip("`\n").endswith(f'<a href="{address}">code</a>')
 
 
 def test_a_caption_is_for_readers(folder: Path) -> None:
