@@ -52,8 +52,8 @@ def _write_code(app: Sphinx, error: Exception | None) -> None:
     """Write the code that pages link to beside them, as text that a browser shows."""
     documented = app.env.domains["py"].data["objects"]
     for path in files.PROJECT.glob("replication/**/*.py"):
-        name = path.relative_to(files.PROJECT)
+        name, code = path.relative_to(files.PROJECT), read_file(path)
         module = ".".join(name.with_suffix("").parts).removesuffix(".__init__")
-        named = module.startswith("replication.report.")  # under a figure
-        if named or any(entry.startswith(f"{module}.") for entry in documented):
-            write_file(Path(app.outdir) / "code" / f"{name.as_posix()}.txt", read_file(path))
+        draws = module.startswith("replication.report.") and b"\ndef draw" in code
+        if draws or any(entry.startswith(f"{module}.") for entry in documented):
+            write_file(Path(app.outdir) / "code" / f"{name.as_posix()}.txt", code)
