@@ -66,5 +66,5 @@ html_copy_source = False
 html_show_sourcelink = False
 html_last_updated_fmt = None
 html_show_sphinx = False
-html_sidebars = {"api/modules/*": []}  # a third of what a short page weighs
+html_sidebars: dict[str, list[str]] = {"api/modules/*": []}  # a third of what a short page weighs
 html_domain_indices = False  # the reference lists the modules itself
