@@ -385,6 +385,7 @@ def test_trials_of_the_stages_can_be_fewer() -> None:
         trials_of("screen", k, sample(40, 1 + k % 7, 10)) for k in range(len(points()))
     )
     assert {group.trials for group in final(table)} == {3}
+    assert {group.labels["part"] for group in final(table)} == {"final"}
 
 
 # --- what is published -----------------------------------------------------------------------

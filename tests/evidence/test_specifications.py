@@ -184,6 +184,11 @@ def test_values_sort_as_text_as_they_do_themselves(values: list[Any]) -> None:
         ('W-NORM = ["unit"]', "SOCCER-EPISODES = [10]", "mazes.single: SOCCER-EPISODES changes"),
         ("SOCCER-ARC = [180]", "DETOUR-WIDTH = [8]", "soccer.single: DETOUR-WIDTH changes nothing"),
         ("SOCCER-ARC = [180]", 'MAP = ["open"]', "soccer.single: MAP changes nothing in soccer"),
+        (
+            "SOCCER-ARC = [180]",
+            'ADABOOST-RULE = ["vote"]',
+            "soccer.single: ADABOOST-RULE changes nothing in soccer; it belongs to the mazes",
+        ),
         ("trials = 30", "trials = 0", "mazes.single.trials: Input should be greater than or"),
         ("trials = 10", "trials = 1", "mazes.factorial.trials: Input should be greater than or"),
         ("size = 240", "size = 0", "mazes.factorial.size: Input should be greater than or"),

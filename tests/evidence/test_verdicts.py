@@ -620,6 +620,7 @@ def test_every_claim_has_a_row_for_each_cell(judged: pd.DataFrame) -> None:
             possible = {SHOWN, ABSENT, REVERSED, INCONCLUSIVE}
         assert set(own["verdict"]) <= possible
         assert set(own["task"]) == {one.task}
+        assert set(own["place"]) == {one.place}
 
 
 def test_p_values_stand_where_there_is_a_test(judged: pd.DataFrame) -> None:
