@@ -7,11 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from replication import Demos, Maze, errors, fit
+from replication import Demos, Maze, fit
 from replication.baselines import max_entropy
 from replication.baselines.problem import Problem, table_of
 from replication.demos.model import Demo
-from replication.errors import UserError
 from tests.learning import plain
 from tests.learning.test_chance import make_moves
 
@@ -105,15 +104,6 @@ def test_weights_of_choices_are_their_log_odds() -> None:
 def test_a_fit_matches_the_expert(small_demos: Demos) -> None:
     """The agent needs one iteration, and incorrect demonstrations change nothing."""
     options: dict[str, Any] = {"method": "max-entropy", "solver": "planning", "seed": 1}
-    results = [fit(small_demos, **options, incorrect=kinds) for kinds in ("none", "all")]
+    results = [fit(small_demos.select(kinds), **options) for kinds in ("none", "all")]
     assert all(result.converged and result.iterations == 1 for result in results)
     assert all((a.weights == b.weights).all() for a, b in pairwise(results))
-
-
-def test_without_scipy_it_says_what_to_install(
-    small_demos: Demos, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Scipy belongs to an extra, which the message names."""
-    monkeypatch.setattr(errors, "find_spec", lambda name: None)
-    with pytest.raises(UserError, match="pip install"):
-        max_entropy.find(problem_of(small_demos))
