@@ -544,7 +544,7 @@ def export(out: Path) -> None:
     "--method",
     default="unified-incorrect",
     metavar="METHOD",
-    help="adaboost, unified, unified-incorrect or a baseline, see docs/methods.md.",
+    help="adaboost, unified or unified-incorrect. Baselines: see docs/methods.md.",
 )
 @number("--seed", 0, "Root seed.", default=0)
 @click.option(
