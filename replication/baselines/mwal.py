@@ -35,7 +35,7 @@ def weights(logs: Array) -> Array:
     weights of a feature and of its negative are exp(c) and exp(-c), over the sum of all.
     """
     logs = np.clip(logs, -700, 700)  # what exp can hold
-    return np.sinh(logs) / (2 * np.cosh(logs)).sum() * 2
+    return np.sinh(logs) / np.cosh(logs).sum()
 
 
 def update(

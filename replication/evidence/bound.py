@@ -40,9 +40,9 @@ from replication.baselines import BaselineCondition, Problem, table_of
 from replication.demos.maze_expert import Expert, demonstrate
 from replication.demos.model import Demos
 from replication.envs.maze import Maze, as_maze
-from replication.evidence.comparison import MAZES
 from replication.evidence.experiments import NONE
 from replication.evidence.margin import margin
+from replication.evidence.specifications import MAPS
 from replication.evidence.statistics import mean_interval
 from replication.evidence.variations import maze_demos
 from replication.paper.params import Params
@@ -95,14 +95,14 @@ def _shapes() -> Iterator[Case]:
         f"legs of {leg}": Expert(leg=int(leg)) for leg in (entry.default, *entry.alternatives)
     }
     experts["random"] = Expert(path="random-1")
-    for world in MAZES:
+    for world in MAPS:
         for shape, expert in experts.items():
             yield Case(world, "shape", shape, maze_demos(world, expert))
 
 
 def _lengths() -> Iterator[Case]:
     """Yield the default shape from starts that lie on it, nearer to the goal."""
-    for world in MAZES[:2]:
+    for world in MAPS[:2]:
         demos = maze_demos(world, Expert())
         maze, states = as_maze(demos.environment), demos.correct[0].states
         for length in LENGTHS:

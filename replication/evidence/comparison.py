@@ -21,6 +21,7 @@ from replication.demos.files import load_demos
 from replication.demos.maze_expert import Expert
 from replication.demos.model import Demos
 from replication.evidence.experiments import EXPERIMENTS, GENERAL, NONE
+from replication.evidence.specifications import MAPS
 from replication.evidence.statistics import mean_interval
 from replication.evidence.variations import maze_demos
 from replication.files import resolve
@@ -34,12 +35,17 @@ from replication.trials.table import Group
 PART = "comparison"
 """What the column `part` of the table of trials has."""
 
-MAZES = ("open", "obstacles", "random-1", "random-2", "random-3")
-"""The paper's two mazes, and the random ones of the multiverse."""
-
 SOLVERS = ("q-learning", "planning")
 
-IN_SOCCER = ("cloning", "one-line", "perceptron", "unified", "unified-incorrect", "wary")
+IN_SOCCER = (
+    "cloning",
+    "one-line",
+    "perceptron",
+    "projection",
+    "unified",
+    "unified-incorrect",
+    "wary",
+)
 """Methods that are run in robot soccer, whose trials take hundreds of times as long as a maze's."""
 
 
@@ -60,7 +66,7 @@ class Setting(NamedTuple):
 def conditions() -> dict[Setting, BaselineCondition]:
     """Return the condition of each setting."""
     found = {}
-    for world in MAZES:
+    for world in MAPS:
         demos = maze_demos(world, Expert())
         for solver in SOLVERS:
             for condition in _each(demos, [*METHODS, *BASELINES], GENERAL, {"solver": solver}):

@@ -16,11 +16,11 @@ from replication.baselines.features import BESIDE, first_best
 from replication.envs.maze import Maze
 from replication.envs.tasks.moves import Moves
 from replication.learning import sweeps
+from replication.paper.params import Params
 
 Array = NDArray[np.float64]
 
-GAMMA = 0.9
-"""The paper's discount factor."""
+GAMMA = Params().learner.gamma
 
 STEP = -1.0
 """The true reward of every move."""

@@ -47,11 +47,8 @@ Array = NDArray[np.float64]
 PART = "limits"
 """What the column `part` of the table of trials has."""
 
-ROOT = 17
-"""Root seed of the trials, used nowhere else."""
-
-TRIALS, SIZE_TRIALS = 20, 5
-"""Draws of demonstrations, with one trial each, and the most trials of a size."""
+SIZE_TRIALS = 5
+"""The most trials of a size, which take longest; a draw of demonstrations has one trial."""
 
 NUMBERS = (1, 2, 3, 5)
 ROLLOUTS = (1, 100)
@@ -84,7 +81,7 @@ class Setting(NamedTuple):
     draw: int
 
 
-def settings(draws: int = TRIALS) -> list[Setting]:
+def settings(draws: int) -> list[Setting]:
     """Return all points; with more draws those before keep their places."""
     found = [Setting("sizes", side, method, 1, 0) for side in SIDES for method in METHODS]
     found.append(Setting("noise", PLAIN, "unified", 1, 0))

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from replication.baselines.problem import Problem
+from replication.baselines.problem import Problem, certain
 from replication.errors import UserError
 
 Array = NDArray[np.float64]
@@ -121,7 +121,8 @@ def margin(problem: Problem) -> Margin:
 def deviations(problem: Problem) -> Deviations:
     """Return all ways to leave the demonstrated path; refuse what has no margin."""
     moves, demos = problem.moves, problem.correct
-    if len(moves.successors) != len(moves.first) - 1:
+    next_state = certain(moves)
+    if next_state is None or len(moves.starts) > 1:
         raise MarginError("a margin needs a task without chance, and this one has moves by chance")
     if len(demos) != 1:
         raise MarginError(f"a margin is that of one correct demonstration, not of {len(demos)}")
@@ -140,13 +141,7 @@ def deviations(problem: Problem) -> Deviations:
     for t in range(1, len(discounts)):
         before[t:, demo.states[t - 1], demo.actions[t - 1]] = discounts[t - 1]
     states = demo.states[steps]
-    after = next_states(problem)[states, others]
-    return Deviations(states, others, after, discounts[steps], before[steps])
-
-
-def next_states(problem: Problem) -> Indices:
-    """Return where each action leads, [state, action], in a task without chance."""
-    return problem.moves.successors[:-1].reshape(problem.moves.shape)
+    return Deviations(states, others, next_state[states, others], discounts[steps], before[steps])
 
 
 def best_visits(problem: Problem, q: Array, ways: Deviations) -> Array:
@@ -156,7 +151,9 @@ def best_visits(problem: Problem, q: Array, ways: Deviations) -> Array:
     """
     n_states = len(q)
     policy, ends = q.argmax(axis=1), problem.moves.ends
-    there = next_states(problem)[np.arange(n_states), policy]
+    next_state = certain(problem.moves)
+    assert next_state is not None  # the deviations are there
+    there = next_state[np.arange(n_states), policy]
     goes_on = np.flatnonzero(~ends & ~ends[there])
     visits = np.eye(n_states)
     visits[there[goes_on], goes_on] -= problem.gamma

@@ -26,18 +26,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from replication.baselines import BASELINES, BaselineCondition, Problem, table_of
+from replication.baselines import BaselineCondition, Problem, table_of
 from replication.baselines.features import features, first_best, perceptron
+from replication.demos.maze_expert import Expert
 from replication.demos.model import Demos
 from replication.envs.maze import as_maze
 from replication.evidence.elsewhere import CHANGES, GAMMA, World, worlds
 from replication.evidence.experiments import GENERAL
-from replication.evidence.specifications import MAPS, Specification
+from replication.evidence.specifications import MAPS
 from replication.evidence.statistics import mean_interval
-from replication.evidence.variations import maze_conditions
-from replication.irl import METHODS
+from replication.evidence.variations import maze_demos
 from replication.irl.expectations import mean_expectations, norm
-from replication.learning.seeds import child
+from replication.learning.seeds import trial_seeds
 from replication.paper.params import Params
 
 Array = NDArray[np.float64]
@@ -47,10 +47,6 @@ Learned = Callable[[World], Array]
 
 LIMIT = 0.1
 """The value lost up to which a reward transfers."""
-
-TRIALS = 20
-ROOT = 16
-"""Number of trials of a method that learns by Q-learning, and their root seed."""
 
 FEATURES = "features"
 """The name of the perceptron whose features mean the same in any maze."""
@@ -81,13 +77,7 @@ LOOPS = ("unified-incorrect", "perceptron")
 """The methods with chance: Q-learning in the paper's loop."""
 
 
-def methods() -> list[str]:
-    """Return the names of the methods that are compared, as far as they are registered."""
-    known = {*METHODS, *BASELINES, FEATURES}
-    return [name for name in PREDICTED if name in known]
-
-
-def transfer_table(tasks: tuple[str, ...] = MAPS, *, trials: int = TRIALS) -> pd.DataFrame:
+def transfer_table(tasks: tuple[str, ...] = MAPS, *, trials: int, seed: int) -> pd.DataFrame:
     """Return the value lost by each method in each changed world of each task.
 
     Parameters
@@ -96,6 +86,8 @@ def transfer_table(tasks: tuple[str, ...] = MAPS, *, trials: int = TRIALS) -> pd
         The names of the mazes.
     trials
         Of each method that learns by Q-learning, at least 2.
+    seed
+        Root seed of these.
 
     Returns
     -------
@@ -106,11 +98,12 @@ def transfer_table(tasks: tuple[str, ...] = MAPS, *, trials: int = TRIALS) -> pd
     """
     rows = []
     for task in tasks:
-        demos = demos_of(task)
+        demos = maze_demos(task, Expert())
         maze = as_maze(demos.environment)
-        changed = worlds(maze, as_maze(demos_of(ANOTHER).environment))
-        for method in methods():
-            learned = [learn(demos, method, k) for k in range(trials if method in LOOPS else 1)]
+        changed = worlds(maze, as_maze(maze_demos(ANOTHER, Expert()).environment))
+        for method in PREDICTED:
+            seeds = trial_seeds(seed, trials if method in LOOPS else 1)
+            learned = [learn(demos, method, seed=each) for each in seeds]
             d = np.mean([_distance(demos, changed["none"], each) for each in learned])
             for change in CHANGES:
                 world = changed[change]
@@ -162,14 +155,8 @@ def verdict_table(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def demos_of(world: str) -> Demos:
-    """Return the demonstrations in a maze by its name, as in the specifications."""
-    conditions = maze_conditions(Specification("transfer", (("MAP", world),)), 1)
-    return next(iter(conditions.values())).demos
-
-
-def learn(demos: Demos, method: str, k: int = 0) -> Learned:
-    """Return what a method learns in trial k, as a policy for any world.
+def learn(demos: Demos, method: str, *, seed: np.random.SeedSequence) -> Learned:
+    """Return what a method learns, as a policy for any world.
 
     Methods of the paper's loop learn by Q-learning, with the paper's defaults, F_i, and the general
     list of incorrect demonstrations if they use them.
@@ -185,7 +172,7 @@ def learn(demos: Demos, method: str, k: int = 0) -> Learned:
         return lambda world: world.follow(features(world.maze) @ theta)
     choices = {} if method in LOOPS else {"solver": "planning", "max_iterations": 1}
     condition = BaselineCondition(demos, method, Params.of(incorrect=GENERAL, **choices))
-    weights = condition.trial(seed=child(np.random.SeedSequence(ROOT), k)).weights
+    weights = condition.trial(seed=seed).weights
     return lambda world: world.follow(weights)
 
 

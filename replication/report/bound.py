@@ -10,10 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from replication.baselines import find_method
+from replication.evidence.experiments import NONE
+from replication.report.comparison import short_label
 from replication.report.drawing import BLUE, DASHES, GREEN, INK, VERMILION, handle
 from replication.report.picture import Picture
-from replication.report.readable import F_LABELS, interval, readable
+from replication.report.readable import interval, readable
 from replication.report.style import canvas, legend_below, settled
 
 LOOKS = {
@@ -30,9 +31,7 @@ SOLVERS = {"planning": "planning", "q-learning": "Q-learning"}
 
 def run_label(method: str, reading: str, solver: str) -> str:
     """Return what a method with an inner solver is called."""
-    label = find_method(method).label.partition(",")[0]
-    label = f"{label}, {F_LABELS[reading].partition(' ')[0]}" if reading else label
-    return f"{label}, {SOLVERS[solver]}"
+    return f"{short_label(method, reading, NONE)}, {SOLVERS[solver]}"
 
 
 def bounds(table: pd.DataFrame) -> Picture:

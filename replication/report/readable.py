@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from replication.baselines import find_method
 from replication.evidence.claims import LABELS, label, load_claims
 from replication.evidence.experiments import GENERAL, NAMED, NONE
 from replication.evidence.verdicts import NOT_TESTABLE, SHOWN
-from replication.irl import READINGS
+from replication.irl import READINGS, get_method
 
 F_LABELS = {
     "": "–",
@@ -53,7 +52,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 def full_label(method: str, reading: str, set: str = NONE) -> str:
     """Return a method's label, with its incorrect demonstrations and reading of Eq. 9, if any."""
-    label = find_method(method).label
+    label = get_method(method).label
     label = label if set == NONE else f"{label} ({SET_LABELS.get(set, set)})"
     return f"{label}, {F_LABELS[reading]}" if reading else label
 
@@ -79,7 +78,7 @@ def p_is(p: float) -> str:
 
 
 METHOD: dict[str, Form] = {
-    "Method": lambda row: find_method(row.method).label,
+    "Method": lambda row: get_method(row.method).label,
     "Reading": lambda row: F_LABELS[row.reading],
 }
 SET: dict[str, Form] = {"Incorrect": lambda row: SET_LABELS.get(row.set, row.set)}
@@ -100,7 +99,7 @@ def _capped(table: pd.DataFrame) -> dict[str, Form]:
 
 MEASURES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "task": ("Task", lambda task: task.replace("-", " ")),
-    "method": ("Method", lambda method: find_method(method).label),
+    "method": ("Method", lambda method: get_method(method).label),
     "reading": ("Reading", F_LABELS.__getitem__),
     "set": ("Incorrect", lambda set: SET_LABELS.get(set, set)),
     "iterations": ("Iterations", "{:.2f}".format),
@@ -151,9 +150,7 @@ def readable_contrasts(table: pd.DataFrame) -> pd.DataFrame:
     return readable(
         table,
         {
-            "Compared": lambda row: (
-                f"{find_method(row.x).label} against {find_method(row.y).label}"
-            ),
+            "Compared": lambda row: f"{get_method(row.x).label} against {get_method(row.y).label}",
             "Reading": METHOD["Reading"],
             **SET,
             "Iterations saved [95 %]": lambda row: interval(row.saved, row.low, row.high),

@@ -34,7 +34,7 @@ MAZES = 1000
 @pytest.fixture(autouse=True)
 def _without_random_mazes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Leave the random mazes out: to find them takes seconds."""
-    monkeypatch.setattr(bound, "MAZES", ("open", "obstacles"))
+    monkeypatch.setattr(bound, "MAPS", ("open", "obstacles"))
     cases.cache_clear()
     yield
     cases.cache_clear()

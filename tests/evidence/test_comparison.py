@@ -11,7 +11,6 @@ from replication.baselines.baseline import Baseline
 from replication.evidence import comparison
 from replication.evidence.comparison import (
     IN_SOCCER,
-    MAZES,
     Setting,
     comparison_table,
     conditions,
@@ -19,6 +18,7 @@ from replication.evidence.comparison import (
     start_table,
 )
 from replication.evidence.experiments import GENERAL, NONE
+from replication.evidence.specifications import MAPS
 from replication.evidence.statistics import mean_interval
 from replication.irl import METHODS
 from replication.irl.methods import TRACES
@@ -58,7 +58,7 @@ def test_every_method_meets_every_maze() -> None:
         method = find_method(name)
         own = [setting for setting in conditions() if setting.method == name]
         mazes = {setting.task for setting in own} - {"soccer"}
-        assert len(mazes) == len(MAZES)
+        assert len(mazes) == len(MAPS)
         assert {setting.solver for setting in own} == {"q-learning", "planning"}
         traces = [reading for reading in method.readings if reading in ("", *TRACES)]
         assert {setting.reading for setting in own} == set(traces)

@@ -6,10 +6,12 @@ from hypothesis import given, settings
 from numpy.typing import NDArray
 
 from replication.baselines import table_of
+from replication.demos.maze_expert import Expert
 from replication.envs.maze import Maze
 from replication.evidence.elsewhere import CHANGES, GAMMA, World, moved_goal, moves_of, worlds
 from replication.evidence.specifications import MAPS
-from replication.evidence.transfer import ANOTHER, demos_of
+from replication.evidence.transfer import ANOTHER
+from replication.evidence.variations import maze_demos
 from tests.envs.mazes import mazes
 
 UP, DOWN, RIGHT, LEFT = range(4)
@@ -98,7 +100,7 @@ def test_the_true_reward_loses_nothing_and_random_moves_all(change: str) -> None
 @pytest.mark.parametrize("task", MAPS)
 def test_the_demonstration_is_optimal(task: str) -> None:
     """In each task nobody is nearer to the goal than the expert: the right answer is known."""
-    demos = demos_of(task)
+    demos = maze_demos(task, Expert())
     maze = demos.environment
     assert isinstance(maze, Maze)
     world = World(maze, moves_of(maze))
@@ -178,10 +180,10 @@ def test_a_mirrored_map_has_the_mirrored_answer() -> None:
 def test_changes_are_all_there_and_the_other_map_is_another() -> None:
     """The names are the worlds; the map of another task has the same size, start and goal."""
     assert tuple(CHANGED) == CHANGES
-    another = demos_of(ANOTHER).environment
+    another = maze_demos(ANOTHER, Expert()).environment
     assert isinstance(another, Maze)
     for task in MAPS:
-        maze = demos_of(task).environment
+        maze = maze_demos(task, Expert()).environment
         assert isinstance(maze, Maze)
         assert (maze.shape, maze.start, maze.goal) == (another.shape, another.start, another.goal)
         assert maze.rows != another.rows

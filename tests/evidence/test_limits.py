@@ -48,7 +48,7 @@ def test_the_design() -> None:
     assert (NUMBERS, ROLLOUTS) == ((1, 2, 3, 5), (1, 100))
     assert (limits.PLAIN, *LEVELS) == (0, 0.05, 0.1, 0.2)
     known = [seed for run in load_claims().known for seed in run.root_seeds]
-    assert not {limits.ROOT, limit_demos.DEMO_ROOT} & {*known, load_claims().judging.root_seed}
+    assert limit_demos.DEMO_ROOT not in {*known, load_claims().judging.root_seed}
     for setting in settings(1):
         own = condition_of(setting)
         changed = CHANGES[setting.design] | ({"ROLLOUTS": 100} if setting.rollouts > 1 else {})
@@ -71,7 +71,6 @@ def test_the_points_keep_their_places() -> None:
     few, many = settings(2), settings(5)
     assert many[: len(few)] == few
     assert len(set(many)) == len(many) == 7 * 3 + 1 + 5 * (4 * 2 + 3)
-    assert settings() == settings(limits.TRIALS)
 
 
 def test_the_last_move_of_the_longest_path_counts() -> None:
@@ -265,5 +264,5 @@ def test_two_different_demonstrations_never_converge(method: str, pair: int) -> 
 def test_a_point_can_be_run() -> None:
     """A trial of the smallest size ends at zero."""
     condition = condition_of(Setting("sizes", 5, "one-line", 1, 0))
-    trial = condition.trial(seed=child(np.random.SeedSequence(limits.ROOT), 0))
+    trial = condition.trial(seed=child(np.random.SeedSequence(17), 0))
     assert (trial.converged, trial.iterations) == (True, 1)

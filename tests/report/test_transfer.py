@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from replication.evidence.elsewhere import CHANGES
 from replication.evidence.specifications import MAPS
-from replication.evidence.transfer import FEATURES, LIMIT, methods, verdict_table
+from replication.evidence.transfer import FEATURES, LIMIT, PREDICTED, verdict_table
 from replication.report.drawing import PURPLE
 from replication.report.transfer import MARKS, colour, label, readable_transfer, transfer
 from tests.report.legible import assert_legible
@@ -20,7 +20,7 @@ def some_transfer() -> pd.DataFrame:
     """Make up the value lost; the one-line reward alone transfers, to two changes."""
     rng = np.random.default_rng(np.random.SeedSequence(1))
     rows = []
-    for task, method, change in product(MAPS, methods(), CHANGES):
+    for task, method, change in product(MAPS, PREDICTED, CHANGES):
         small = method == "one-line" and change in ("none", "slip 0.1")
         lost, half = (0.02 if small else rng.uniform(0.2, 1)), (0.0 if small else 0.05)
         row = {"task": task, "method": method, "change": change, "n": 20, "lost": lost}
@@ -53,7 +53,7 @@ def test_values_stand_at_their_changes(figure: Figure) -> None:
         limit, *lines = panel.lines
         assert set(np.asarray(limit.get_ydata()).tolist()) == {LIMIT}
         spans = [one for one in panel.collections if isinstance(one, LineCollection)]
-        for line, span, method, mark in zip(lines, spans, methods(), MARKS, strict=False):
+        for line, span, method, mark in zip(lines, spans, PREDICTED, MARKS, strict=False):
             own = rows[rows["method"] == method].set_index("change").loc[list(CHANGES)]
             assert (line.get_color(), line.get_marker()) == (colour(method), mark)
             assert np.asarray(line.get_ydata()).tolist() == own["lost"].tolist()
@@ -61,14 +61,14 @@ def test_values_stand_at_their_changes(figure: Figure) -> None:
             assert np.round(places).tolist() == list(range(len(CHANGES)))
             ends = [np.asarray(segment)[:, 1].tolist() for segment in span.get_segments()]
             assert ends == own[["low", "high"]].to_numpy().tolist()
-        assert len(lines) == len(spans) == len(methods())
+        assert len(lines) == len(spans) == len(PREDICTED)
 
 
 def test_methods_stand_side_by_side_and_look_different(figure: Figure) -> None:
     """Methods that lose the same do not hide one another."""
     first = sorted(np.asarray(line.get_xdata())[0] for line in figure.axes[0].lines[1:])
     assert (np.diff(first) > 0.1).all()
-    assert len({colour(method) for method in methods()}) == len(methods())
+    assert len({colour(method) for method in PREDICTED}) == len(PREDICTED)
     assert (colour(FEATURES), label(FEATURES)) == (PURPLE, "Perceptron, five features")
     assert label("one-line") == "One-line reward"
 
