@@ -38,15 +38,10 @@ PART = "comparison"
 SOLVERS = ("q-learning", "planning")
 
 IN_SOCCER = (
-    "cloning",
-    "one-line",
-    "perceptron",
-    "projection",
-    "unified",
-    "unified-incorrect",
-    "wary",
+    *("cloning", "one-line", "perceptron", "projection"),
+    *("unified", "unified-incorrect", "wary"),
 )
-"""Methods that are run in robot soccer, whose trials take hundreds of times as long as a maze's."""
+"""Methods that are run in robot soccer, whose trials take longest."""
 
 
 class Setting(NamedTuple):
