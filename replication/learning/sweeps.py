@@ -26,6 +26,9 @@ ROUNDING = 2.0**-48
 """What moves less, relative to the largest value, may be rounding: that is where planning ends if
 gamma is so near to 1 that `PRECISION` cannot be had."""
 
+TINY = 1e-290
+"""What is smaller counts as nothing: numbers that have lost digits may move for ever."""
+
 
 def optimal(moves: Moves, weights: Array, *, gamma: float, q: Array | None = None) -> Array:
     """Return the optimal Q [state, action] of the reward `weights`.
@@ -144,7 +147,7 @@ def _improve(first, successors, probabilities, ends, weights, q, gamma, softly):
     for s in range(n_states):
         values[s] = 0.0 if ends[s] else _choose(q, s, policy, softly)
     while True:
-        moved = largest = 0.0
+        moved, largest = 0.0, TINY
         for s in range(n_states):
             for a in range(n_actions):
                 pair = s * n_actions + a

@@ -104,7 +104,7 @@ def draw_beginning(numbers: pd.DataFrame) -> Figure:
             for panel, name in zip(line[1:], ("errors", "collisions"), strict=True):
                 x, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low", "_high"))
                 panel.hlines(place, low, high, color=colour)
-                panel.plot(x, place, "o", ms=4, color=colour)
+                panel.plot(x, place, "o", ms=4, color=colour, clip_on=False)
         line[0].set_ylabel(f"{TASKS[task]}\nmedian error d", size=8)
         for panel in line[1:]:
             panel.set_yticks([])

@@ -75,6 +75,16 @@ def test_a_start_changes_nothing(case: Case, softly: bool) -> None:
         assert near(find(case.moves, case.weights, gamma=case.gamma, q=q), cold)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_without_rewards_nothing_is_worth_anything(seed: int) -> None:
+    """From a Q far away, values without rewards fall until they are nothing, and planning ends."""
+    rng = np.random.default_rng(seed)
+    table = rng.dirichlet(np.full(6, 0.3), (6, 2))
+    moves = make_moves(table, np.eye(6)[0], np.zeros(6, bool))
+    q = 300 * rng.normal(size=(6, 2))
+    assert near(sweeps.optimal(moves, np.zeros((6, 2)), gamma=0.9, q=q), np.zeros((6, 2)))
+
+
 @settings(max_examples=300)
 @given(cases())
 def test_visits_solve_their_equations(case: Case) -> None:
