@@ -519,6 +519,30 @@ def site(out: Path) -> None:
     click.echo(f"open {first.resolve().as_uri()} in a browser")
 
 
+@app.command(epilog="Example: replicate lab --out lab.html")
+@click.option(
+    "--out", type=FILE, metavar="FILE", help="Write the page to this file instead of opening it."
+)
+def lab(out: Path | None) -> None:
+    """Draw mazes and watch the methods learn, in the browser.
+
+    The page needs no network and no server. In a clone it can also check published trials.
+    """
+    from replication.lab.page import lab_page
+
+    _catch_signals()
+    figures = files.PROJECT / "figures"
+    page = lab_page(figures if figures.is_dir() else None).encode()
+    if out is not None:
+        files.write_file(out, page)
+        click.echo(f"page: {_short(out)}")
+        return
+    path = Path(tempfile.mkdtemp(prefix="maze-lab-")) / "lab.html"
+    files.write_file(path, page)
+    click.echo(f"open {path.as_uri()} in a browser")
+    click.launch(path.as_uri())
+
+
 @app.command(cls=InClone, epilog="Example: replicate export")
 @folder("Where the export goes.", Path("build/export"))
 def export(out: Path) -> None:

@@ -88,7 +88,8 @@ def build(project: Path, kind: str, folder: Path) -> None:
 def test_wheel_holds_the_package(wheel: Path) -> None:
     """It has each module, what modules read, the stored demonstrations and the mark of types."""
     package = PROJECT / "replication"
-    kept = [path for kind in ("py", "toml", "html", "typed") for path in package.rglob(f"*.{kind}")]
+    kinds = ("py", "toml", "html", "css", "js", "wat", "wasm", "typed")
+    kept = [path for kind in kinds for path in package.rglob(f"*.{kind}")]
     expected = {path.relative_to(PROJECT).as_posix(): path.read_bytes() for path in kept}
     for path in (PROJECT / "data" / "demos").glob("*.json"):
         expected[f"replication/stored/{path.name}"] = path.read_bytes()

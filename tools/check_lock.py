@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PYTHONS = ("3.11", "3.12", "3.13")
-UNLOCKED = "croissant"  # the extra that cannot be locked, pyproject.toml says why
+UNLOCKED = ("croissant", "wasm")  # extras that are not locked, pyproject.toml says why
 PIN = re.compile(r"([\w-]+==[\w.!+]+(?: ; [^@]+?)?)((?: --hash=sha256:[0-9a-f]{64})+)")
 
 
@@ -39,7 +39,7 @@ def read_requirements(project: str) -> list[Requirement]:
     """Return what the text of a pyproject.toml asks for: to build, to run and for each extra."""
     table = tomllib.loads(project)
     extras = table["project"].get("optional-dependencies", {})
-    locked = [texts for extra, texts in extras.items() if extra != UNLOCKED]
+    locked = [texts for extra, texts in extras.items() if extra not in UNLOCKED]
     groups = [table["build-system"]["requires"], table["project"]["dependencies"], *locked]
     return [Requirement(text) for group in groups for text in group]
 

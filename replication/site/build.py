@@ -17,6 +17,7 @@ from replication import files
 from replication.errors import UserError
 from replication.evidence.tables import read_table
 from replication.files import read_file, read_text, write_file
+from replication.lab.page import lab_part
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
 from replication.pipeline.plan import Run, prepare
@@ -169,6 +170,7 @@ def _generated(out: Path) -> dict[str, str]:
         "verdicts": overview.verdicts(judged, holds),
         "published": overview.published(judged),
         "choices": choices(read_table(out / "sensitivity" / "shares.csv")),
+        "lab": f"```{{raw}} html\n{lab_part(out)}```",
         "citation": overview.citation(read_text(files.PROJECT / "CITATION.cff")),
     }
 

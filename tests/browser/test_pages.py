@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import tomllib
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
@@ -14,32 +12,21 @@ from urllib.parse import unquote, urlparse
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page
 
 from replication.files import PROJECT, read_json
-from replication.site.build import build_site
+from tests.browser.screen import NARROW, PATIENCE, WIDE, Open
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)
-
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None,
-    reason="the site is tested in Chromium; on Debian: apt install chromium",
-)
-
-NARROW, WIDE = {"width": 390, "height": 844}, {"width": 1600, "height": 1000}
 PLAYERS = ("notebooks/open_maze", "notebooks/obstacle_maze", "notebooks/soccer")
 READ = (
     *("index", "findings", "claims", "choices", "trust", "methods"),
     *("running", "demonstrations", "task", "gymnasium", "record", "reward"),
-    *("architecture", "api/index", "cite"),
+    *("architecture", "api/index", "cite", "lab"),
     *PLAYERS,
     *("notebooks/method", "notebooks/claims", "notebooks/calibration", "notebooks/sensitivity"),
     *("notebooks/beyond", "notebooks/rounding", "round_1"),
 )
 """Every page that is written for readers; others list code."""
-
-PATIENCE = 1_200_000
-"""Milliseconds after which something hangs, on however slow a machine."""
 
 SMALL = 2_000_000
 """Bytes that a page may have, with all that it loads."""
@@ -49,57 +36,6 @@ LIGHT = 15_000_000
 
 FOLD = 900
 """Pixels of the first screen, on which the answer stands."""
-
-
-@pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the site from the published results."""
-    notebooks = sorted((PROJECT / "notebooks").glob("*.ipynb"))
-    return build_site(notebooks, tmp_path_factory.mktemp("site") / "site").parent
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """Start the system's Chromium, without anything that it would ask of a network."""
-    quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=CHROMIUM,
-            args=["--no-sandbox", "--no-first-run", *quiet],
-            timeout=PATIENCE,
-        )
-        yield browser
-        browser.close()
-
-
-Open = Callable[..., Page]
-
-
-@pytest.fixture
-def open_page(browser: Browser, site: Path) -> Iterator[Open]:
-    """Open a page from disk; at the end nothing may have failed or been asked of a network."""
-    faults: list[str] = []
-    contexts = []
-
-    def open_page(name: str, *, size: dict[str, int] = WIDE, **options: Any) -> Page:
-        contexts.append(browser.new_context(viewport=size, **options))  # type: ignore[arg-type]
-        contexts[-1].set_default_timeout(PATIENCE)
-        page = contexts[-1].new_page()
-        page.on("console", lambda line: faults.extend([line.text] * (line.type == "error")))
-        page.on("pageerror", lambda error: faults.append(str(error)))
-        page.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url[:200]}"))
-        page.on("request", lambda asked: faults.extend([asked.url] * (not _is_local(asked.url))))
-        page.goto((site / f"{name}.html").as_uri())
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert faults == []
-
-
-def _is_local(address: str) -> bool:
-    return urlparse(address).scheme in ("file", "data", "blob")
 
 
 def test_every_page_for_readers_is_tested(site: Path) -> None:
