@@ -165,7 +165,7 @@ function read(text) {
       throw new Refusal(`${where}: a list of at most ${most} texts is needed here`);
     return value;
   };
-  const text_ = (value, where, pattern, fix, most = 100) => {
+  const word = (value, where, pattern, fix, most = 100) => {
     if (typeof value !== "string" || value.length > most || !pattern.test(value)) throw new Refusal(`${where}: ${quoted(value)} does not fit: ${fix}`);
     return value;
   };
@@ -175,8 +175,8 @@ function read(text) {
     if (data[field] !== expected) throw new Refusal(`'${field}' must be ${JSON.stringify(expected)}`);
   fields(data, "", known.filter((name) => !["description", "incorrect"].includes(name)), known);
   const drawing = {
-    task: text_(data.task, "task", /^[A-Za-z0-9][A-Za-z0-9_-]*$/, "use letters, digits, '-' and '_', a letter or digit first"),
-    description: text_("description" in data ? data.description : "", "description", /^[^]*$/, "use a text", 10_000),
+    task: word(data.task, "task", /^[A-Za-z0-9][A-Za-z0-9_-]*$/, "use letters, digits, '-' and '_', a letter or digit first"),
+    description: word("description" in data ? data.description : "", "description", /^[^]*$/, "use a text", 10_000),
   };
   const environment = data.environment;
   if (isObject(environment) && environment.kind !== "maze")
@@ -196,7 +196,7 @@ function read(text) {
     drawing[part] = demos.map((demo, at) => {
       const where = `${part}[${at}]`;
       fields(demo, where, own, [...own, "states"]);
-      const name = text_(demo.name, `${where}.name`, /^[^\u0000-\u001f\u007f]+$/, "write it on one line, without control characters");
+      const name = word(demo.name, `${where}.name`, /^[^\u0000-\u001f\u007f]+$/, "write it on one line, without control characters");
       const kind = part === "correct" ? part : kindOf(demo.kind, `${where}.kind`);
       const actions = texts(demo.actions, `${where}.actions`, MOST.moves).map((action, t) => {
         if (!ACTIONS.includes(action))

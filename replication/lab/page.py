@@ -65,15 +65,15 @@ def lab_part(figures: Path | None = None) -> str:
     figures
         Folder of the published results, whose trials can then be checked.
     """
-    worker = ("numbers.js", "learner.js", "irl.js", "worker.js")
-    page = ("maze.js", "pictures.js", "app.js")
+    worker = ("numbers", "learner", "irl", "worker")
+    page = ("maze", "pictures", "app", "pool", "watch", "editor", "many", "published", "begin")
     data = json.dumps(lab_data(figures), ensure_ascii=False, separators=(",", ":"))
     parts = {
         "STYLE": _text("lab.css"),
         "DIGITS": str(DIGITS),
         "DATA": data.replace("</", "<\\/"),
-        "WORKER": "\n".join(map(_text, worker)),
-        "PAGE": "\n".join(map(_text, page)),
+        "WORKER": _scripts(worker),
+        "PAGE": _scripts(page),
     }
     text = _text("lab.html")
     for name, part in parts.items():
@@ -209,6 +209,10 @@ def _only(values: pd.Series) -> int:
 
 def _bytes(name: str) -> bytes:
     return resources.files(__package__).joinpath(name).read_bytes()
+
+
+def _scripts(names: tuple[str, ...]) -> str:
+    return "\n".join(_text(f"{name}.js") for name in names)
 
 
 def _text(name: str) -> str:

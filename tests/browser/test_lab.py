@@ -574,7 +574,10 @@ def test_a_pointer_draws_and_drives(lab: Page) -> None:
     lab.locator("[name=lab-tool][value=wall]").check()
     lab.mouse.click(*middle(lab, 0, 1))
     expect(lab.locator("#verdict")).to_contain_text("misses the goal")
+    assert lab.locator("#run").is_disabled()
+    assert lab.locator("#export").is_disabled()
     lab.locator("#undo").click()
+    assert lab.locator("#run").is_enabled()
     expect(lab.locator("#verdict")).to_have_text("These demonstrations can be used.")
     lab.locator("[name=lab-tool][value=goal]").check()
     lab.mouse.click(*middle(lab, 1, 2))
@@ -589,10 +592,24 @@ def test_a_finger_drives(open_page: Open) -> None:
     for name in ("Down", "Right", "Right", "Up"):
         lab.get_by_role("button", name=name, exact=True).tap()
     expect(lab.locator("#total")).to_have_text("1 correct demo, 0 incorrect")
+    lab.locator("#run").tap()
+    expect(lab.locator("#meter")).to_contain_text("60 of 60 trials")
+    assert lab.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
     lab.locator("#all summary").tap()
     expect(lab.locator("#demos")).to_contain_text("correct, 4 moves")
     lab.get_by_role("button", name="Remove correct").tap()
     expect(lab.locator("#verdict")).to_contain_text("there is no correct demo")
+
+
+def test_a_changed_maze_loses_its_name(lab: Page) -> None:
+    """Whoever changes the paper's maze has one of their own, with another name."""
+    assert lab.locator("#task").input_value() == "open-maze"
+    lab.locator("[name=lab-tool][value=wall]").check()
+    lab.mouse.click(*middle(lab, 0, 0))
+    assert lab.locator("#task").input_value() == "mine"
+    assert lab.locator("#maze option:checked").inner_text() == "your own"
+    lab.locator("#undo").click()
+    assert lab.locator("#task").input_value() == "open-maze"
 
 
 def test_a_kind_that_no_file_may_have_is_refused(lab: Page) -> None:
