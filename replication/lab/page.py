@@ -95,12 +95,7 @@ def lab_page(figures: Path | None = None) -> str:
 
 
 class Lab:
-    """The lab in a cell of a notebook; what is drawn there comes to Python as a saved file.
-
-    Examples
-    --------
-    >>> Lab()  # doctest: +SKIP
-    """
+    """The lab in a cell of a notebook; what is drawn there comes to Python as a saved file."""
 
     def _repr_html_(self) -> str:
         """Return a frame that holds the page."""
