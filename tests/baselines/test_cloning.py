@@ -27,9 +27,11 @@ def test_soccer_is_copied_too(soccer_demos: Demos) -> None:
 
 
 def test_the_policy_is_the_experts_action(stored_demos: Demos) -> None:
-    """Where the expert acts it is his action; elsewhere all actions are as good."""
+    """Where the expert acts it is the action by mu_E; elsewhere all actions are as good."""
     result = fit(stored_demos, method="cloning", seed=1)
     right = stored_demos.correct[0]
+    discounts = 0.9 ** np.arange(len(right.actions))
+    np.testing.assert_allclose(result.q[right.states[:-1], right.actions], discounts)
     assert result.policy()[right.states[:-1]].tolist() == right.actions.tolist()
     others = np.setdiff1d(np.arange(stored_demos.environment.n_states), right.states[:-1])
     assert not result.q[others].any()
@@ -46,5 +48,6 @@ def test_of_several_actions_it_takes_the_most_frequent() -> None:
     with pytest.warns(DemoWarning):
         result = fit({"correct": [up, up, across]}, task=square, method="cloning", seed=1)
     assert result.actions.tolist() == demos.correct[0].actions.tolist()
+    assert not result.weights.any()
     # Each of two pairs has 2/3 of its visit instead of all, each of two others 1/3 instead of none.
     assert result.errors[0] == pytest.approx(np.sqrt(2 * (1 + 0.9**2)) / 3)

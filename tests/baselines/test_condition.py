@@ -124,3 +124,24 @@ def test_a_found_reward_is_found_once_and_learned_by(
     other = BaselineCondition(small_demos, "bayesian", Params.of(incorrect="detour"))
     assert other.found is not asked.found
     assert len(calls) == 2
+
+
+def test_each_problem_is_solved_for_itself(
+    small_demos: Demos, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A reward is found anew for another method or discount; if it is useless, that is the end."""
+    calls: list[Problem] = []
+
+    def find(problem: Problem) -> Any:
+        calls.append(problem)
+        return np.zeros(problem.moves.shape)
+
+    for name in ("bayesian", "max-margin"):
+        monkeypatch.setitem(BASELINES, name, replace(BASELINES[name], find=find))
+    monkeypatch.setattr(condition, "_FOUND", {})
+    for name in ("bayesian", "max-margin"):
+        for gamma in (0.9, 0.5):
+            params = Params.of(incorrect="hit", gamma=gamma, solver="planning")
+            trial = BaselineCondition(small_demos, name, params).trial(seed=trial_seeds(13, 1)[0])
+            assert (trial.iterations, trial.converged) == (1, False)
+    assert [problem.gamma for problem in calls] == [0.9, 0.5] * 2

@@ -79,8 +79,8 @@ def test_beside_is_across() -> None:
 
 def test_first_best_takes_the_first_of_equals() -> None:
     """Values that differ by rounding tie, whatever their sign; others do not."""
-    q = np.array([[0, 0, 0], [1, 1 + 1e-12, 0], [-1 - 1e-12, -1, -2], [1, 1.001, 0]])
-    assert first_best(q).tolist() == np.eye(3)[[0, 0, 0, 1]].tolist()
+    q = np.array([[0, 0, 0], [-1, 0, 0], [1, 1 + 1e-12, 0], [-1 - 1e-12, -1, -2], [1, 1.001, 0]])
+    assert first_best(q).tolist() == np.eye(3)[[0, 1, 0, 0, 1]].tolist()
 
 
 def test_it_learns_a_corridor() -> None:

@@ -22,10 +22,13 @@ def problem(small_demos: Demos) -> Problem:
     return problem_of(small_demos)
 
 
-def parts(problem: Problem, w: Array, scale: float = SCALE) -> tuple[Array, Array, Array]:
-    """Return w_S, w_F and the visits of the soft policy of their sum, found in plain NumPy."""
+def parts(problem: Problem, w: Array) -> tuple[Array, Array, Array]:
+    """Return w_S, w_F and the visits of the soft policy of their sum, found in plain NumPy.
+
+    In w_F a visit more than failures have earns 1.
+    """
     mu = plain.soft_visits(problem.moves, w, gamma=problem.gamma)
-    repelling = (mu - problem.mu_wrong.mean(axis=0)) / scale
+    repelling = mu - problem.mu_wrong.mean(axis=0)
     return w - repelling, repelling, mu
 
 
@@ -80,10 +83,10 @@ def test_a_large_scale_repels_nothing(problem: Problem) -> None:
 
 
 def test_what_is_success_and_failure_at_once_is_not_repelled(problem: Problem) -> None:
-    """If failures are the successes, w_F is w_S times -RIDGE / SCALE, and hardly anything."""
+    """If failures are the successes, w_F is w_S times -RIDGE, and hardly anything."""
     both = replace(problem, incorrect=problem.correct)
     w_s, w_f, _ = parts(both, from_failure.find(both))
-    np.testing.assert_allclose(w_f, -RIDGE / SCALE * w_s, atol=1e-7)
+    np.testing.assert_allclose(w_f, -RIDGE * w_s, atol=1e-7)
     assert np.abs(w_f).max() < 2e-3
 
 

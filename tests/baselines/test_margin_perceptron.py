@@ -20,6 +20,17 @@ def test_the_margin_holds_against_every_policy() -> None:
         assert (w @ mu_e - every @ w >= bonus - 1e-9).all()
 
 
+def test_its_updates_by_hand() -> None:
+    """Into each of three walls it runs for ever once, which are 10 visits; then the goal is best.
+
+    It takes them one after the other, as each yet unpunished one is worth 10 by its bonus.
+    """
+    problem = problem_of(tiny_demos(("SG",)))
+    w = margin_perceptron.find(problem)
+    np.testing.assert_allclose(w, [[-10, -10, 3, -10], [0, 0, 0, 0]])
+    assert problem.plans == 4
+
+
 def test_its_updates_are_bounded() -> None:
     """There are at most (R^2 + 2 L) / delta^2, with delta and R over all policies."""
     demos = tiny_demos()

@@ -3,7 +3,7 @@ from __future__ import annotations
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given, settings
 
 from replication import Demos, GymTask, TabularTask
 from replication.baselines import Problem, table_of
@@ -13,6 +13,8 @@ from replication.envs.tasks.moves import Moves
 from replication.irl.expectations import feature_expectations
 from replication.learning.planning import plan
 from tests.envs.mazes import mazes
+from tests.learning import plain
+from tests.learning.test_sweeps import Case, cases
 
 
 @pytest.fixture
@@ -104,3 +106,15 @@ def test_following_the_expert_gives_his_visits(small_demos: Demos, problem: Prob
     came[problem.moves.starts] += 1
     came[problem.moves.ends] = 0
     np.testing.assert_allclose(mu.sum(axis=1), came, rtol=0, atol=1e-9)
+
+
+@settings(max_examples=200)
+@given(cases())
+def test_following_takes_the_first_of_equals(case: Case) -> None:
+    """With chance or without, from one start or several: visits of the first best actions."""
+    assume(case.gamma > 0 or not case.moves.ends[case.moves.starts].any())
+    q = np.round(case.q / 300)  # so that many tie
+    first = [row.index(max(row)) for row in q.tolist()]
+    found = Problem(case.moves, (), (), case.gamma).follow(q)
+    expected = plain.visits(case.moves, np.eye(q.shape[1])[first], gamma=case.gamma)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)

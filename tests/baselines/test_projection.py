@@ -61,6 +61,16 @@ def test_a_step_by_hand() -> None:
     np.testing.assert_array_equal(memory, mu_i)
 
 
+def test_the_mixture_begins_with_the_first_trajectory() -> None:
+    """It is the agent's whole first trajectory, even if the expert is nearer to nothing at all."""
+    mu_e, mu_i = np.array([[0.1, 0.0]]), np.array([[0.0, 1.0]])
+    w, memory = projection.update(
+        NONE, projection.start((1, 2), Update()), mu_e, mu_i, NONE, Update()
+    )
+    np.testing.assert_array_equal(memory, mu_i)
+    np.testing.assert_array_equal(w, [[0.1, -1.0]])
+
+
 @pytest.mark.parametrize("solver", ["q-learning", "planning"])
 def test_it_learns_the_stored_tasks(stored_demos: Demos, solver: str) -> None:
     """It ends on the expert's path in both mazes of the paper."""

@@ -95,12 +95,12 @@ def test_reversed_ranks_reverse_the_weights(small_demos: Demos, problem: Problem
 
 
 def test_one_pair_has_a_weight_by_hand(small_demos: Demos) -> None:
-    """With one pair w = c D, where c solves ridge c = sigmoid(-c |D|^2)."""
+    """With one pair and standard normal weights w = c D, where c solves c = sigmoid(-c |D|^2)."""
     problem = problem_of(small_demos, right=small_demos.correct, wrong=small_demos.incorrect[:1])
     (difference,) = differences_of(problem)
     size, c = np.sum(difference**2), 0.0
     for _ in range(200):  # halving
-        c = (c + 1 / (1 + np.exp(c * size)) / ranking.RIDGE) / 2
+        c = (c + 1 / (1 + np.exp(c * size))) / 2
     np.testing.assert_allclose(ranking.find(problem).ravel(), c * difference, rtol=0, atol=1e-8)
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
 
 import pytest
 
@@ -34,9 +35,22 @@ def test_each_says_what_it_makes_of_incorrect_demonstrations() -> None:
 
 
 def test_each_begins_with_a_memory() -> None:
-    """A memory has the shape of the table, or holds several such."""
+    """A memory has the shape of the table, or holds several such; by default it is empty."""
     for method in EVERY:
         assert method.start((3, 2), Update()).shape[-2:] == (3, 2)
+    assert not BASELINES["mwal"].start((3, 2), Update()).any()
+
+
+@pytest.mark.parametrize("name", [name for name in BASELINES if name != "cloning"])
+def test_each_is_what_the_module_of_its_name_computes(name: str) -> None:
+    """A method without a loop has its module's search; any other its update, and its start."""
+    method, module = (
+        BASELINES[name],
+        import_module(f"replication.baselines.{name}".replace("-", "_")),
+    )
+    assert method.find is getattr(module, "find", None)
+    for part in ("start", "update"):
+        assert getattr(method, part) is getattr(module, part, getattr(BASELINES["cloning"], part))
 
 
 def test_a_misspelt_method_is_refused_with_the_list() -> None:

@@ -12,6 +12,7 @@ from replication.evidence.elsewhere import CHANGES, GAMMA, World, moved_goal, mo
 from replication.evidence.specifications import MAPS
 from replication.evidence.transfer import ANOTHER
 from replication.evidence.variations import maze_demos
+from replication.learning.planning import plan
 from tests.envs.mazes import mazes
 
 UP, DOWN, RIGHT, LEFT = range(4)
@@ -72,13 +73,32 @@ def test_a_corridor_by_hand() -> None:
 @settings(max_examples=40, deadline=None)
 @given(mazes(5))
 def test_values_are_those_of_a_linear_system(maze: Maze) -> None:
-    """In every changed world, for a policy of chance and for random moves."""
+    """In every changed world, for a policy of chance, for random moves, and for the best of all."""
     rng = np.random.default_rng(maze.n_states)
     for name, world in worlds_of(maze).items():
         policy = rng.dirichlet(np.ones(4), maze.n_states)
         assert world.value(policy) == pytest.approx(solved(world, policy), rel=1e-9), name
         assert world.random == pytest.approx(solved(world, np.full((maze.n_states, 4), 0.25)))
-        assert world.best >= world.value(policy) - 1e-9
+        assert world.best == pytest.approx(
+            planned(world, np.full((maze.n_states, 4), -1.0)), rel=1e-9
+        )
+
+
+@settings(max_examples=40, deadline=None)
+@given(mazes(5))
+def test_what_follows_a_reward_is_best_by_it(maze: Maze) -> None:
+    """In every changed world no policy earns more of a reward than the one that follows it."""
+    weights = np.random.default_rng(maze.n_states).normal(size=(maze.n_states, 4))
+    for name, world in worlds_of(maze).items():
+        earned = (world.visits(world.follow(weights)) * weights).sum()
+        assert earned == pytest.approx(planned(world, weights), abs=1e-6), name
+
+
+def planned(world: World, weights: Array) -> float:
+    """Return the greatest value by a reward, by plain value iteration."""
+    values = plan(weights, world.moves.ahead, gamma=GAMMA).max(axis=1)
+    starts = world.moves.probabilities[world.moves.first[-2] :]
+    return float(starts @ values[world.moves.starts])
 
 
 def worlds_of(maze: Maze) -> dict[str, World]:

@@ -44,3 +44,39 @@ def test_shares_by_hand() -> None:
     other = shares.loc["all", "length"]
     assert other["low"] == 0 < other["share"] < other["high"]
     assert other["pairs"] == sum(length[i] != length[j] for i in range(n) for j in range(i))
+
+
+FEW = pd.DataFrame(
+    {
+        "method": "unified",
+        "reading": "printed",
+        "solver": "planning",
+        "vary": "shape",
+        "delta": [1.0, 2.0, 3.0, 5.0, 4.0],
+        "length": [2, 4, 8, 16, 32],
+        "mean": [10.0, 20.0, 20.0, 40.0, 30.0],
+    }
+)
+
+
+def test_few_cases_by_hand() -> None:
+    """A tie of iterations counts half, and an interval that holds no correlation begins at 0.
+
+    With length r is 0.87 and Fisher's z 1.91 standard errors, just less than 1.96; with 1 / delta^2
+    it is -0.97, so that the end nearer to 0 is the upper one.
+    """
+    margin, length = share_table(FEW).iloc[:2].to_dict("records")
+    assert (margin["pairs"], margin["right"]) == (10, pytest.approx(0.05))
+    assert (length["pairs"], length["right"]) == (10, pytest.approx(0.85))
+    assert length["low"] == 0
+    ends = stats.pearsonr(np.log(FEW["delta"] ** -2.0), np.log(FEW["mean"])).confidence_interval()
+    assert ends.low < ends.high < 0
+    assert (margin["low"], margin["high"]) == pytest.approx((ends.high**2, ends.low**2), rel=1e-6)
+
+
+def test_runs_stand_by_themselves() -> None:
+    """Each has its own rows, as if it were alone, in the order of the table."""
+    other = FEW.assign(method="perceptron", reading="", mean=[5.0, 7.0, 9.0, 8.0, 6.0])
+    together = share_table(pd.concat([FEW, other]))
+    alone = [share_table(FEW), share_table(other)]
+    pd.testing.assert_frame_equal(together, pd.concat(alone, ignore_index=True))

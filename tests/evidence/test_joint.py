@@ -57,6 +57,19 @@ def test_familywise_by_definition() -> None:
     assert found.median == pytest.approx(np.median(differences.mean(axis=1)))
 
 
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_significant_by_definition(n: int) -> None:
+    """In each pattern of signs those count whose t-test by SciPy has p < 2.5 % on that side."""
+    differences = np.random.default_rng(9).normal(0.1, 1, (300, n))
+    counts = []
+    for signs in product((1, -1), repeat=n):
+        t = stats.ttest_1samp(differences * signs, 0.0, axis=1, alternative="greater")
+        counts.append(int((t.pvalue < 0.025).sum()))
+    found = joint_test(differences)
+    assert found.significant == counts[0] > 0
+    assert found.p_significant == np.mean(np.array(counts) >= counts[0])
+
+
 @pytest.mark.parametrize("n", [8, 40])
 def test_one_specification_is_a_sign_flip_test(n: int) -> None:
     """Alone, a specification has the p-value of its own test, and its null lies about zero."""

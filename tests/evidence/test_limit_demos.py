@@ -24,6 +24,7 @@ from replication.evidence.limit_demos import (
     path_demos,
 )
 from replication.irl.expectations import feature_expectations
+from replication.learning.seeds import child
 from tests.envs.mazes import mazes
 
 GAMMA = 0.9
@@ -91,6 +92,18 @@ def test_what_is_drawn_twice_counts_once(monkeypatch: pytest.MonkeyPatch) -> Non
     assert [demo.actions.tolist() for demo in path_demos(2, 0).correct] == [STAIRS, CORNER]
 
 
+def test_draws_are_of_the_declared_root() -> None:
+    """Each design has its own branch of it, and each draw a branch of that."""
+    root = np.random.SeedSequence(18)
+    maze, path = as_maze(limit_demos._stored().environment), limit_demos._stored().correct[0]
+    for draw in (0, 3):
+        paths, noise = (child(child(root, design), draw) for design in (0, 1))
+        drawn = random_actions(maze, seed=child(paths, 0))
+        assert path_demos(1, draw).correct[0].actions.tolist() == drawn
+        slipped = noisy_actions(maze, path, 0.2, seed=noise)
+        assert noisy_demos(0.2, draw).correct[0].actions.tolist() == slipped
+
+
 # --- noisy demonstrations --------------------------------------------------------------------
 
 
@@ -119,6 +132,9 @@ def test_noisy_drives_reach_the_goal(maze: Maze, level: float, number: int) -> N
         expected = dict(zip(path.states[:-1].tolist(), path.actions.tolist(), strict=True))
         if here in expected:
             assert (way[t] == expected[here]) != slips
+        else:
+            ahead = distances[maze.next_state[here]].tolist()
+            assert (way[t] == ahead.index(distances[here] - 1)) != slips
 
 
 def test_slips_are_as_frequent_as_their_level_and_take_each_other_action() -> None:
@@ -187,6 +203,15 @@ def test_nearest_by_brute_force(ways: list[list[int]]) -> None:
     assert found == pytest.approx(min(d for walk, d in every.items() if len(walk) == 4))
     assert found == pytest.approx(min(every.values()))
     assert nearest_demo(demos, gamma=GAMMA) == pytest.approx(min(every[tuple(w)] for w in ways))
+
+
+def test_nearest_is_a_shortest_path_though_a_demonstration_is_none() -> None:
+    """One that runs into a wall first is not followed there."""
+    longer = [LEFT, *STAIRS]
+    mu_e = (mu(TINY, longer) + mu(TINY, CORNER)) / 2
+    shortest = [walk for walk in WALKS if len(walk) == 4]
+    least = min(float(np.linalg.norm(mu_e - mu(TINY, walk))) for walk in shortest)
+    assert nearest(shown(TINY, longer, CORNER), gamma=GAMMA) == pytest.approx(least)
 
 
 EVERY = [

@@ -49,7 +49,7 @@ def test_the_design() -> None:
     assert (limits.PLAIN, *LEVELS) == (0, 0.05, 0.1, 0.2)
     known = [seed for run in load_claims().known for seed in run.root_seeds]
     assert limit_demos.DEMO_ROOT not in {*known, load_claims().judging.root_seed}
-    for setting in settings(1):
+    for setting in settings(2):
         own = condition_of(setting)
         changed = CHANGES[setting.design] | ({"ROLLOUTS": 100} if setting.rollouts > 1 else {})
         assert own.params.differences() == changed
@@ -60,10 +60,10 @@ def test_the_design() -> None:
             case "sizes":
                 assert own.demos.environment.n_states == setting.value**2
             case "paths":
-                assert own.demos == path_demos(int(setting.value), 0)
+                assert own.demos == path_demos(int(setting.value), setting.draw)
                 assert len(own.demos.correct) == setting.value
             case "noise":
-                assert own.demos == noisy_demos(setting.value, 0)
+                assert own.demos == noisy_demos(setting.value, setting.draw)
 
 
 def test_the_points_keep_their_places() -> None:
@@ -112,7 +112,7 @@ def made_up() -> pd.DataFrame:
                 "0.3" if at % 7 == 0 and not zero else "2",
                 *["3"] * (at % 5),
                 "0" if zero else "0.5",
-                *([] if zero else ["1"]),
+                *([] if zero else ["0.5", "1"]),
             ]
         )
         for at, zero in zip(number, done, strict=True)
@@ -176,6 +176,21 @@ def test_paths_by_hand(trials: pd.DataFrame) -> None:
     assert 0 < table["untrained"].mean() < 1
     assert (table.loc[table["number"] == 1, "shortest"] == 0).all()
     assert table["nearer"].nunique() > 1
+
+
+def test_what_comes_as_near_but_for_rounding_has_reached_it(trials: pd.DataFrame) -> None:
+    """Distances are written with ten digits, which are a little more or less than what they say."""
+
+    def history(setting: Setting) -> str:
+        demos = path_demos(int(setting.value), setting.draw)
+        return f"4 {nearest(demos, gamma=0.9):.10g} 3"
+
+    numbered = settings(N)
+    own = trials[(trials["part"] == PART) & (trials["trial"] == 0)]
+    own = own[[numbered[number].design == "paths" for number in own["number"]]]
+    table = paths_table(own.assign(errors=[history(numbered[n]) for n in own["number"]]))
+    assert set(table["reached"]) == {1}
+    assert set(table["nearer"]) == {0}
 
 
 def test_noise_by_hand(trials: pd.DataFrame, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,12 @@ from scipy import stats
 from replication import Demos, save_demos
 from replication.evidence import bound, calibration, comparison, limits, rounding, sweep
 from replication.evidence.experiments import EXPERIMENTS, Experiment
-from replication.evidence.recompute import declared_condition, recompute_trials, sampled
+from replication.evidence.recompute import (
+    DESIGNS,
+    declared_condition,
+    recompute_trials,
+    sampled,
+)
 from replication.evidence.tables import write_csv
 from replication.files import PROJECT
 from replication.trials.compute import trial_key
@@ -222,6 +227,16 @@ def test_conditions_of_all_parts_come_back() -> None:
         ):
             again = declared_condition({str(name): value for name, value in row.items()})
             assert trial_key(again, 7, 0) == trial_key(condition, 7, 0)
+
+
+@pytest.mark.parametrize("part", DESIGNS)
+def test_a_table_of_a_part_agrees(tmp_path: Path, part: str) -> None:
+    """Trials that a part and a number name are computed again, whatever design they belong to."""
+    group = Group([DESIGNS[part](1)], 2, {"part": part, "number": 1})
+    trials = computed_table([group], errors=True, store=Store(tmp_path / "s.sqlite"), seed=4)
+    told: list[int] = []
+    assert wrong(write_csv(trials, tmp_path / "trials.csv"), report=told.append) == []
+    assert told == [2]
 
 
 @pytest.mark.parametrize(

@@ -293,6 +293,7 @@ def test_gaps_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     table = profile_table()
     assert table["step"].tolist() == [0, 1] * 3
     assert table["method"].tolist() == ["adaboost"] * 2 + ["unified"] * 4
+    assert table["reading"].tolist() == [""] * 2 + ["printed"] * 2 + ["updated"] * 2
     assert set(table["tables"]) == {4}
     assert table["tied"].tolist() == [0.5, 0.5] * 3
     assert table["rounded"].tolist() == [0.0, 0.5] * 3

@@ -135,7 +135,7 @@ def test_intervals_of_means_are_those_of_scipy(confidence: float) -> None:
     )
 
 
-@pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.1, 40.0, 1 / 3]])
+@pytest.mark.parametrize("values", [[0.0, 3.0, -7.1], [0.3, -0.3, 1 / 3]])
 def test_constant_rows_are_their_own_intervals(values: list[float]) -> None:
     """A row that does not vary has its value as both bounds, whatever the other rows do."""
     flat = np.repeat(np.array(values)[:, None], 10, axis=1)

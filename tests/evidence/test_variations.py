@@ -19,6 +19,7 @@ from replication.evidence.specifications import (
     load_specifications,
     single_specifications,
 )
+from replication.evidence.tables import pairs_near, read_table
 from replication.evidence.variations import (
     MOVES,
     OBSTACLES,
@@ -29,7 +30,7 @@ from replication.evidence.variations import (
     soccer_conditions,
     trace_conditions,
 )
-from replication.files import resolve
+from replication.files import PROJECT, resolve
 from replication.irl import READINGS, get_method
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
@@ -320,7 +321,8 @@ def test_numbered_demonstrations_lead_to_their_pair(
     maze = as_maze(demos.environment)
     back = distances_from_start(demos)
     pairs = set()
-    for demo in demos.incorrect:
+    for number, demo in enumerate(demos.incorrect):
+        assert demo.name == f"pair-{number}"
         state = int(demo.states[-2])
         assert len(demo.actions) == back[state] + 1
         assert maze.next_state[state, demo.actions[-1]] == demo.states[-1]
@@ -341,10 +343,37 @@ def distances_from_start(demos: Demos) -> dict[int, int]:
     return found
 
 
+def test_numbered_demonstrations_are_in_random_order(numbered: Numbered) -> None:
+    """The declared seed gives the same order each time, and another seed another one."""
+
+    def order(conditions: Numbered) -> list[tuple[int, ...]]:
+        largest = max(number for number, _ in conditions)
+        shown = conditions[largest, "printed"].selected.incorrect
+        return [(*demo.states[-2:].tolist(), int(demo.actions[-1])) for demo in shown]
+
+    same, other = (
+        order(numbered_conditions(PLAN.ablations.model_copy(update={"seed": seed}), CAP))
+        for seed in (PLAN.ablations.seed, PLAN.ablations.seed + 1)
+    )
+    assert same == order(numbered) != other
+    assert sorted(same) == sorted(other)
+
+
+def test_published_numbers_are_of_these_demonstrations(numbered: Numbered) -> None:
+    """The published table has the marked pairs of the conditions, which depend on the seed."""
+    path = PROJECT / "figures" / "sensitivity" / "numbers.csv"
+    if not path.exists():
+        pytest.skip("figures/sensitivity is not published yet")
+    for row in read_table(path).itertuples():
+        near = pairs_near(numbered[row.number, row.reading].selected)
+        assert (row.pairs, row.leaving) == (near["pairs"], near["leaving"])
+
+
 def test_numbered_settings_differ_in_demonstrations_alone(
     numbered: Numbered,
 ) -> None:
     """Without incorrect demonstrations it is the method that uses none; the cap reaches all."""
+    stored = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
     for number in {number for number, _ in numbered}:
         readings = [f for n, f in numbered if n == number]
         assert readings == list(READINGS if number else TRACES)
@@ -354,4 +383,4 @@ def test_numbered_settings_differ_in_demonstrations_alone(
         changed = condition.params.differences()
         assert changed.pop("INCORRECT-KINDS") == ("all" if number else "none")
         assert changed == {"ITERATION-CAP": CAP, **chosen_reading(f)}
-        assert condition.demos.correct == numbered[0, "printed"].demos.correct
+        assert condition.demos.correct == stored.correct
