@@ -98,7 +98,7 @@ def recompute_trials(
         columns = {*row, *text} - {"part", "number"}
         if _depends_on_the_processor(condition):
             columns &= {*factors(condition), "trial", "seed", "iterations", "converged"}
-        if wrong := sorted(column for column in columns if row.get(column) != text.get(column)):
+        if wrong := sorted(column for column in columns if row.get(column) != text.get(column, "")):
             yield f"{name}: its trial gives another {', '.join(wrong)}"
         if stored is not None and not _agrees(stored, condition, root, k, computed[key]):
             yield f"{store.name}: {name}: the stored trial has other bits"

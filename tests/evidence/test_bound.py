@@ -8,13 +8,14 @@ import pytest
 
 from replication import Maze
 from replication.baselines import BaselineCondition
-from replication.demos.maze_expert import Expert, demonstrate
+from replication.demos.maze_expert import Expert, correct_actions, demonstrate
 from replication.demos.model import Demos
-from replication.envs.maze import MazeError
+from replication.envs.maze import MazeError, as_maze
 from replication.evidence import bound
 from replication.evidence.bound import (
     LENGTHS,
     RUNS,
+    Case,
     bound_table,
     cases,
     conditions,
@@ -99,7 +100,7 @@ def test_no_trajectory_is_farther_than_r(text: str) -> None:
 
 
 def test_cases_are_what_the_names_say() -> None:
-    """Every shape is there once, and nearer starts lie on the default path."""
+    """Every shape is there once; nearer starts lie on the default path, and have its legs."""
     found = cases()
     paths = [(case.world, case.demos.correct[0].actions.tobytes()) for case in found]
     assert len(set(paths)) == len(paths) == 2 * (6 + len(LENGTHS))
@@ -113,6 +114,20 @@ def test_cases_are_what_the_names_say() -> None:
             assert len(demo.actions) in LENGTHS
             assert demo.states[0] == whole.states[-1 - len(demo.actions)]
             assert demo.states[-1] == whole.states[-1]
+            maze, leg = as_maze(case.demos.environment), Expert().leg
+            assert demo.actions.tolist() == correct_actions(maze, leg=leg)
+
+
+def test_of_equal_paths_the_first_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two shapes may have the same path in a maze; in another maze it is another case."""
+    demos = maze_demos("open", Expert())
+    made = [
+        Case(world, "shape", shape, demos)
+        for world, shape in (("open", "one"), ("open", "other"), ("obstacles", "one"))
+    ]
+    monkeypatch.setattr(bound, "_shapes", lambda: iter(made))
+    monkeypatch.setattr(bound, "_lengths", lambda: iter(()))
+    assert [case[:3] for case in cases()] == [made[0][:3], made[2][:3]]
 
 
 def test_plan_has_a_group_for_each_condition() -> None:
@@ -128,6 +143,7 @@ def test_plan_has_a_group_for_each_condition() -> None:
         params = condition.params
         assert (condition.method, params.learner.solver) == (method, solver)
         assert reading in ("", params.update.f_index)
+        assert params.demonstrations.incorrect == "none"
         assert condition.demos is cases()[number // len(RUNS)].demos
 
 
@@ -140,7 +156,7 @@ def made_trials() -> pd.DataFrame:
             "number": n,
             "trial": k,
             "iterations": n + rng.integers(1, 9),
-            "converged": 1,
+            "converged": int(k != n % 5),
         }
         for part in ("bound", "other")
         for n in range(len(cases()) * len(RUNS))
@@ -162,6 +178,7 @@ def test_table_joins_bound_and_trials() -> None:
         counts = own["iterations"].to_numpy(float)
         assert (row["n"], row["mean"], row["most"]) == (5, counts.mean(), counts.max())
         assert (row["low"], row["high"]) == pytest.approx(tuple(map(float, mean_interval(counts))))
+        assert row["converged"] == own["converged"].mean()
         case = cases()[number // len(RUNS)]
         problem = problem_of(case.demos)
         assert (row["world"], row["vary"], row["shape"]) == case[:3]

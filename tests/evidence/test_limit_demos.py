@@ -85,11 +85,17 @@ def test_paths_differ_and_are_shortest() -> None:
 
 
 def test_what_is_drawn_twice_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A path that comes again is not taken for another one."""
-    drawn = iter([STAIRS, STAIRS, STAIRS, CORNER])
-    monkeypatch.setattr(limit_demos, "random_actions", lambda maze, seed: next(drawn))
+    """A path that comes again is not taken for another one, and each draw has its own seed."""
+    drawn, seeds = iter([STAIRS, STAIRS, STAIRS, CORNER]), []
+
+    def random_actions(maze: Maze, *, seed: np.random.SeedSequence) -> list[int]:
+        seeds.append(seed.spawn_key)
+        return next(drawn)
+
+    monkeypatch.setattr(limit_demos, "random_actions", random_actions)
     monkeypatch.setattr(limit_demos, "_stored", lambda: shown(TINY, STAIRS))
     assert [demo.actions.tolist() for demo in path_demos(2, 0).correct] == [STAIRS, CORNER]
+    assert len(set(seeds)) == 4
 
 
 def test_draws_are_of_the_declared_root() -> None:
@@ -164,7 +170,7 @@ def test_contradictions_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("side", [2, 5, 10, 20, 30])
 def test_legs_are_as_even_as_the_experts(side: int) -> None:
-    """From corner to corner by a shortest path, whose legs cost as little as any."""
+    """From corner to corner by a shortest path, whose legs cost as little as any; up first."""
 
     def cost(actions: list[int]) -> int:
         return sum((len(list(leg)) - Expert().leg) ** 2 for _, leg in groupby(actions))
@@ -177,6 +183,7 @@ def test_legs_are_as_even_as_the_experts(side: int) -> None:
     assert maze.cell(maze.goal) == (0, side - 1)
     own = demos.correct[0].actions.tolist()
     assert len(own) == 2 * (side - 1)
+    assert own[0] == UP
     assert cost(own) == cost(correct_actions(maze, leg=Expert().leg))
 
 
@@ -205,13 +212,13 @@ def test_nearest_by_brute_force(ways: list[list[int]]) -> None:
     assert nearest_demo(demos, gamma=GAMMA) == pytest.approx(min(every[tuple(w)] for w in ways))
 
 
-def test_nearest_is_a_shortest_path_though_a_demonstration_is_none() -> None:
-    """One that runs into a wall first is not followed there."""
-    longer = [LEFT, *STAIRS]
-    mu_e = (mu(TINY, longer) + mu(TINY, CORNER)) / 2
+def test_nearest_is_a_shortest_path_though_the_demonstration_is_none() -> None:
+    """One that turns away from the goal on its way is not followed there."""
+    turns = [UP, RIGHT, DOWN, RIGHT, UP, UP]
     shortest = [walk for walk in WALKS if len(walk) == 4]
-    least = min(float(np.linalg.norm(mu_e - mu(TINY, walk))) for walk in shortest)
-    assert nearest(shown(TINY, longer, CORNER), gamma=GAMMA) == pytest.approx(least)
+    least = min(float(np.linalg.norm(mu(TINY, turns) - mu(TINY, walk))) for walk in shortest)
+    assert nearest(shown(TINY, turns), gamma=GAMMA) == pytest.approx(least)
+    assert nearest_demo(shown(TINY, turns), gamma=GAMMA) == 0 < least
 
 
 EVERY = [

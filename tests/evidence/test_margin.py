@@ -21,6 +21,7 @@ from replication.evidence.margin import (
     least_norm,
     margin,
 )
+from replication.learning.planning import plan
 
 TINY = ("SG", "S.G", "S..\n..G", ".S.\n..G", "S.\nG.")
 
@@ -90,6 +91,25 @@ def test_margin_holds_for_trajectories_at_random(text: str, gamma: float) -> Non
     assert nearest >= found.delta
 
 
+@pytest.mark.parametrize("text", [*TINY, ".S...\n.G...\n.#..#", "S..\n...\nG..\n...\n..."])
+def test_delta_is_what_the_weights_keep(text: str) -> None:
+    """It is the least w* . (mu_E - mu) over |w*|, by plain value iteration: 1, or hardly less.
+
+    In the last two mazes there are ever longer loops, each a little better.
+    """
+    problem = problem_of(text, 0.9)
+    found = margin(problem)
+    w, (demo,) = found.weights, problem.correct
+    q = plan(w, problem.moves.ahead, gamma=0.9)
+    whole, before, kept = (w * problem.mu_e).sum(), 0.0, []
+    for t, (state, right) in enumerate(zip(demo.states[:-1], demo.actions, strict=True)):
+        kept += [whole - before - 0.9**t * q[state, a] for a in range(4) if a != right]
+        before += 0.9**t * w[state, right]
+    assert 1 - 1e-4 <= min(kept) < 1 + 1e-9
+    assert found.delta < min(kept) / np.linalg.norm(w)
+    assert found.delta == pytest.approx(min(kept) / np.linalg.norm(w), rel=2e-9)
+
+
 def test_margin_by_hand() -> None:
     """A move before the goal: w is a for it and, by symmetry, -b for each of the three walls.
 
@@ -102,6 +122,7 @@ def test_margin_by_hand() -> None:
     # of all with a / 2 + b = 1 the least a^2 + 3 b^2
     assert (a, b[0]) == pytest.approx((6 / 7, 4 / 7), rel=1e-3)
     assert found.delta == pytest.approx((36 / 49 + 3 * 16 / 49) ** -0.5, rel=1e-3)
+    assert found.constraints == 3
 
 
 def test_margin_is_at_least_that_of_the_one_line_reward() -> None:
@@ -112,10 +133,19 @@ def test_margin_is_at_least_that_of_the_one_line_reward() -> None:
     assert margin(problem).delta > (3 * sum(gamma ** (-2 * t) for t in range(n))) ** -0.5
 
 
-def test_ways_lead_off_the_path_and_on_as_planned() -> None:
-    """Each way has the visits of its best trajectory, followed here step by step."""
-    problem, maze = problem_of("S..\n.#.\n..G", 0.8), Maze.from_text("S..\n.#.\n..G")
-    (demo,) = problem.correct
+@pytest.mark.parametrize(
+    ("text", "states", "path"),
+    [("S..\n.#.\n..G", [0, 1, 2, 5, 8], [2, 2, 1, 1]), ("S.\nG.", [0, 1, 3, 2], [2, 1, 3])],
+)
+def test_ways_lead_off_the_path_and_on_as_planned(
+    text: str, states: list[int], path: list[int]
+) -> None:
+    """Each way has the visits of its best trajectory, followed here step by step.
+
+    The second path is no shortest one, so that a way off it leads straight to the goal.
+    """
+    demo, maze = walk(states, path), Maze.from_text(text)
+    problem = replace(problem_of(text, 0.8), correct=(demo,))
     ways = deviations(problem)
     assert len(ways.states) == 3 * len(demo.actions)
     q = np.random.default_rng(np.random.SeedSequence(3)).normal(size=problem.moves.shape)
@@ -164,16 +194,15 @@ def test_what_has_no_margin_is_refused() -> None:
     for changed, words in (
         (replace(problem, correct=(path, path)), "one correct demonstration, not of 2"),
         (replace(problem, gamma=1.0), "between 0 and 1, not 1.0"),
+        (replace(problem, gamma=0.0), "between 0 and 1, not 0.0"),
         (replace(problem, correct=(walk([0, 1, 0, 1, 2], [2, 3, 2, 2]),)), "'mine' has no margin"),
         (replace(problem, correct=(walk([0, 1], [2]),)), "ends at the goal"),
     ):
         with pytest.raises(MarginError, match=words):
             margin(changed)
-    moves = Moves.of(
-        ([0, 0, 1], [0, 0, 0], [0, 1, 1], [0.5, 0.5, 1]),
-        shape=(2, 1),
-        starts=[1, 0],
-        ends=[False, True],
-    )
-    with pytest.raises(MarginError, match="moves by chance"):
-        margin(Problem(moves, (walk([0, 1], [0]),), (), 0.9))
+    by_chance = ([0, 0, 1], [0, 0, 0], [0, 1, 1], [0.5, 0.5, 1]), [1, 0]
+    from_anywhere = ([0, 1], [0, 0], [1, 1], [1, 1]), [0.5, 0.5]
+    for outcomes, starts in (by_chance, from_anywhere):
+        moves = Moves.of(outcomes, shape=(2, 1), starts=starts, ends=[False, True])
+        with pytest.raises(MarginError, match="moves by chance"):
+            margin(Problem(moves, (walk([0, 1], [0]),), (), 0.9))

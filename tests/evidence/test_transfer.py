@@ -4,11 +4,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from replication.baselines import BaselineCondition
 from replication.demos.maze_expert import Expert, demonstrate
 from replication.envs.maze import Maze, as_maze
 from replication.evidence import transfer
-from replication.evidence.elsewhere import CHANGES, World, moves_of
+from replication.evidence.elsewhere import CHANGES, World, moves_of, worlds
+from replication.evidence.experiments import GENERAL
+from replication.evidence.statistics import mean_interval
 from replication.evidence.transfer import (
+    ANOTHER,
     FEATURES,
     LIMIT,
     PREDICTED,
@@ -17,7 +21,9 @@ from replication.evidence.transfer import (
     verdict_table,
 )
 from replication.evidence.variations import maze_demos
+from replication.irl.expectations import mean_expectations
 from replication.learning.seeds import trial_seeds
+from replication.paper.params import Params
 
 UP, RIGHT = 0, 2
 SEED = np.random.SeedSequence(1)
@@ -25,8 +31,8 @@ SEED = np.random.SeedSequence(1)
 
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
-    """Compute one task with two trials."""
-    return transfer_table(("open",), trials=2, seed=16)
+    """Compute one task with three trials."""
+    return transfer_table(("open",), trials=3, seed=16)
 
 
 def row(task: str, method: str, change: str, lost: float, high: float) -> dict[str, object]:
@@ -102,7 +108,7 @@ def test_the_table_is_tidy(table: pd.DataFrame) -> None:
     assert set(once["n"]) == {1}
     assert (once["low"] == once["lost"]).all()
     assert (once["high"] == once["lost"]).all()
-    assert set(table["n"][table["method"].isin(transfer.LOOPS)]) == {2}
+    assert set(table["n"][table["method"].isin(transfer.LOOPS)]) == {3}
     assert set(table["method"][table["features"] == "few"]) == {FEATURES}
     assert (table["low"] <= table["lost"]).all()
     assert (table["lost"] <= table["high"]).all()
@@ -110,8 +116,26 @@ def test_the_table_is_tidy(table: pd.DataFrame) -> None:
 
 def test_the_table_is_the_same_again(table: pd.DataFrame) -> None:
     """Nothing is drawn but from the root seed."""
-    again = transfer_table(("open",), trials=2, seed=16)
+    again = transfer_table(("open",), trials=3, seed=16)
     pd.testing.assert_frame_equal(again, table, check_exact=True)
+
+
+@pytest.mark.parametrize("method", transfer.LOOPS)
+def test_the_table_is_of_what_was_learned(table: pd.DataFrame, method: str) -> None:
+    """Each trial learns by the defaults and the general list, and loses what it loses elsewhere."""
+    demos = maze_demos("open", Expert())
+    maze, another = (as_maze(one.environment) for one in (demos, maze_demos(ANOTHER, Expert())))
+    condition = BaselineCondition(demos, method, Params.of(incorrect=GENERAL))
+    rewards = [condition.trial(seed=seed).weights for seed in trial_seeds(16, 3)]
+    own = table[table["method"] == method].set_index("change")
+    for change, world in worlds(maze, another).items():
+        lost = np.array([world.lost(world.follow(reward)) for reward in rewards])
+        expected = lost.mean(), *map(float, mean_interval(lost))
+        assert own.loc[change, ["lost", "low", "high"]].tolist() == pytest.approx(expected)
+    world = World(maze, moves_of(maze))
+    mu_e = mean_expectations(demos.correct, gamma=0.9, shape=world.moves.shape)
+    d = [np.linalg.norm(mu_e - world.visits(world.follow(reward))) for reward in rewards]
+    assert own["d"].tolist() == pytest.approx([np.mean(d)] * len(CHANGES))
 
 
 def test_a_copier_knows_the_path_alone(table: pd.DataFrame) -> None:
