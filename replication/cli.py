@@ -531,16 +531,15 @@ def lab(out: Path | None) -> None:
     from replication.lab.page import lab_page
 
     _catch_signals()
-    figures = files.PROJECT / "figures"
-    page = lab_page(figures if figures.is_dir() else None).encode()
     if out is not None:
-        files.write_file(out, page)
-        click.echo(f"page: {_short(out)}")
-        return
-    path = Path(tempfile.mkdtemp(prefix="maze-lab-")) / "lab.html"
+        _check_targets(out)
+    figures = files.PROJECT / "figures"
+    page = lab_page(figures if figures.is_dir() else None)
+    path = out or Path(tempfile.mkdtemp(prefix="maze-lab-")) / "lab.html"
     files.write_file(path, page)
-    click.echo(f"open {path.as_uri()} in a browser")
-    click.launch(path.as_uri())
+    click.echo(f"open {path.resolve().as_uri()} in a browser")
+    if out is None:
+        click.launch(path.as_uri())
 
 
 @app.command(cls=InClone, epilog="Example: replicate export")
@@ -835,12 +834,12 @@ def _all_notebooks() -> list[Path]:
     return sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
 
 
-def _check_targets(*targets: Path, source: Path) -> None:
+def _check_targets(*targets: Path, source: Path | None = None) -> None:
     """Refuse files that could not be written, or would take their source's place."""
     for path in targets:
         if path.exists() and not path.is_file():
             raise UserError(f"{path} cannot be written: it is not a regular file; choose another")
-        if path.exists() and path.samefile(source):
+        if source is not None and path.exists() and path.samefile(source):
             raise UserError(f"{path} would be overwritten; choose another --out")
     files.check_writable(targets[0].parent)
 

@@ -35,7 +35,7 @@ from tests.terminal import in_terminal
 
 COMMANDS = [
     *(["run"], ["draw"], ["status"], ["verify"], ["copy"], ["clean"], ["site"], ["export"]),
-    *(["learn"], ["choices"]),
+    *(["lab"], ["learn"], ["choices"]),
     *(["demos", name] for name in ("make", "record", "check", "schema")),
 ]
 
@@ -494,6 +494,28 @@ def test_learn_takes_every_kind_of_task(tmp_path: Path) -> None:
     assert Fit.load(tmp_path / "soccer-unified-incorrect.json").iterations == int(cap)
     picture = tmp_path / "soccer-unified-incorrect.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_lab_is_opened_or_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is opened from a file of its own, or written to one that is named; no clone is needed."""
+    opened: list[str] = []
+    monkeypatch.setattr("click.launch", opened.append)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
+    assert replicate("lab").exit_code == 0
+    (page,) = tmp_path.glob("maze-lab-*/lab.html")
+    assert opened == [page.as_uri()]
+    assert replicate("lab", "--out", tmp_path / "new" / "mine.html").exit_code == 0
+    assert (tmp_path / "new" / "mine.html").read_bytes() == page.read_bytes()
+    assert len(opened) == 1
+
+
+def test_the_lab_takes_no_other_things_place(tmp_path: Path) -> None:
+    """A folder, a pipe or a device stays what it is."""
+    os.mkfifo(tmp_path / "pipe")
+    for target in (tmp_path, tmp_path / "pipe", Path("/dev/null")):
+        assert "is not a regular file" in refused("lab", "--out", target)
+    assert not Path("/dev/null").is_file()
 
 
 def test_learn_computes_nothing_that_it_cannot_save(

@@ -94,9 +94,9 @@ function show() {
 }
 
 function tell() {
-  const begin = "An expert drives from S to G (the broad line). Each method sees only this path, and looks for rewards "
-    + "under which Q-learning drives it, too. The third is also shown mistakes (dashed): a pair of state and action that "
-    + "a mistake contains, and the expert does not, loses more at once.";
+  const begin = "An expert drives from S to G (the broad line). Each method looks for rewards under which Q-learning "
+    + "drives this way, too. The third is also shown mistakes (dashed): where the agent takes a step of a mistake that "
+    + "the expert never takes, the reward of that step falls by more.";
   if (!complete()) return void ($("story").textContent = begin);
   $("story").textContent = `${begin} ${outcome()}`;
   const [steps, seconds] = ["steps", "seconds"].map((name) => runs.reduce((sum, { done }) => sum + done[name], 0));
@@ -108,7 +108,7 @@ function outcome() {
   const [, without, given] = runs.map((run) => run.done);
   const saved = without.iterations - given.iterations, where = parting();
   const hint = left.has("opposite") && drawing.incorrect.some(({ kind }) => kind === "opposite")
-    ? " Moves in the opposite direction, which change most, are left out here: tick them under Switches." : "";
+    ? " Moves in the opposite direction are left out here: tick them under Switches." : "";
   if (where < 0) return `Here the mistakes changed nothing: no marked pair made a difference.${hint}`;
   const words = saved > 0 ? `saved ${saved}` : saved < 0 ? `cost ${-saved}` : "saved none";
   return `Here the mistakes ${words} of ${without.iterations} iterations; the two part at iteration ${where}. `

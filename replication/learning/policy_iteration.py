@@ -77,10 +77,7 @@ def visits(
 ) -> Array:
     """Return the discounted visits mu(s, a) (Eq. 7) of a policy that takes `policy` [state]."""
     mu = np.zeros(next_state.shape)
-    if gamma > 0:
-        _visit(next_state, ends, policy, start, gamma, mu)
-    else:
-        mu[start, policy[start]] = 1.0
+    _visit(next_state, ends, policy, start, gamma, mu)
     return mu
 
 
