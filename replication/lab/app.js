@@ -1,10 +1,11 @@
 // What all of the page shares: its data, what is drawn, and what is chosen.
 "use strict";
 
-const DATA = JSON.parse(document.getElementById("lab-data").textContent);
-const METHOD_MARKS = Object.fromEntries(DATA.methods.map(({ name, marks }) => [name, marks]));
 const $ = (id) => document.getElementById(id);
 const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+const unpacked = new Blob([bytes($("lab-data").textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
+const DATA = await new Response(unpacked).json();
+const METHOD_MARKS = Object.fromEntries(DATA.methods.map(({ name, marks }) => [name, marks]));
 
 function add(parent, tag, attributes = {}, text = "") {
   const node = parent.appendChild(document.createElement(tag));
@@ -14,8 +15,8 @@ function add(parent, tag, attributes = {}, text = "") {
 }
 
 const unpack = (demo) => ({ ...demo, actions: Array.from(demo.actions, Number) });
-const MAZES = DATA.mazes.map(({ correct, incorrect, ...rest }) =>
-  ({ ...rest, correct: correct.map(unpack), incorrect: incorrect.map(unpack) }));
+const unpackAll = ({ correct, incorrect, ...rest }) => ({ ...rest, correct: correct.map(unpack), incorrect: incorrect.map(unpack) });
+const MAZES = DATA.mazes.map(unpackAll);
 const copy = (value) => structuredClone(value);
 
 let drawing = copy(MAZES[0]);

@@ -1,20 +1,23 @@
 // The beginning, when all else is there.
 "use strict";
 
-const entries = [["rgb(0 158 115)", "reward above 0"], ["rgb(204 121 167)", "below 0"], ["currentColor", "the agent's path"], [MARKED, "mistakes shown"]];
-for (const [color, words] of entries) {
-  const entry = add($("key"), "span");
-  add(entry, "i", { style: `background: ${color}` });
-  entry.append(words);
-}
+for (const [id, entries] of [
+  ["key", { "reward above 0": `rgb(${SEEK.join(" ")})`, "below 0": `rgb(${AVOID.join(" ")})`, "the agent's path": "currentColor", "mistakes shown": MARKED }],
+  ["outcomes", { ...OUTCOMES, "hollow: trials at the cap": "transparent; border: 1px solid" }],
+])
+  for (const [words, color] of Object.entries(entries)) {
+    const entry = add($(id), "span");
+    add(entry, "i", { style: `background: ${color}` });
+    entry.append(words);
+  }
+$("lab").hidden = false;
 choose({});
 redraw(drawing, { remember: false });
-new ResizeObserver(() => {
+const drawAll = () => {
   show();
   edit();
   if (counted.length) drawHistogram($("histogram"), counted);
-}).observe($("lab"));
-new MutationObserver(() => {
-  show();
-  edit();
-}).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
+  if (effects.length) showSpecification();
+};
+new ResizeObserver(drawAll).observe($("lab"));
+new MutationObserver(drawAll).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });

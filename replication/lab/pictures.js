@@ -3,6 +3,7 @@
 
 const SEEK = [0, 158, 115], AVOID = [204, 121, 167], TRACE = [0, 114, 178];
 const MARKED = "#d55e00";
+const OUTCOMES = { holds: "#0072b2", open: "#808080", reversed: "#d55e00" };
 
 /** A canvas's context, scaled to its size in CSS pixels, cleared; and its colour of text. */
 function paper(canvas) {
@@ -137,9 +138,12 @@ function axes(context, ink, { left, right, bottom, last, x }) {
   line(context, [[left, bottom], [right, bottom]]);
   context.globalAlpha = 1;
   context.textAlign = "center";
-  const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((size) => last / size <= 8) ?? 5000;
+  const step = stepFor(last, 8);
   for (let i = 0; i <= last; i += step) context.fillText(String(i), x(i), bottom + 16);
 }
+
+/** A round step that parts a range into at most so many. */
+const stepFor = (range, most) => [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((size) => range / size <= most) ?? 5000;
 
 /** A row of dots for each method: the iterations of its trials, equal ones above each other. */
 function drawHistogram(canvas, groups) {
@@ -163,5 +167,46 @@ function drawHistogram(canvas, groups) {
         context.arc(x(value), base - radius * (2 * k + 1), radius, 0, 7);
         context.fill();
       }
+  });
+}
+
+const EFFECTS = { left: 44, right: 8, top: 18, bottom: 8 };
+
+/** The rank of the effect that is drawn at a place of the canvas, if one is. */
+function effectAt(canvas, n, place) {
+  const rank = Math.round(((place - EFFECTS.left) / (canvas.clientWidth - EFFECTS.left - EFFECTS.right)) * n - 0.5);
+  return rank >= 0 && rank < n ? rank : null;
+}
+
+/** Effects in their order, with their intervals; a line marks the one that is selected. */
+function drawEffects(canvas, effects, selected) {
+  const { context, width, height, ink } = paper(canvas);
+  const [left, right, top, bottom] = [EFFECTS.left, width - EFFECTS.right, EFFECTS.top, height - EFFECTS.bottom];
+  const least = Math.min(0, ...effects.map(({ mean, half }) => mean - half));
+  const most = Math.max(1, ...effects.map(({ mean, half }) => mean + half));
+  const x = (rank) => left + ((right - left) * (rank + 0.5)) / effects.length;
+  const y = (value) => bottom - ((bottom - top) * (value - least)) / (most - least);
+  Object.assign(context, { fillStyle: ink, strokeStyle: ink, lineWidth: 1, textAlign: "left" });
+  context.fillText("iterations saved", left, 11);
+  context.textAlign = "right";
+  const step = stepFor(most - least, 6);
+  for (let value = Math.ceil(least / step) * step; value <= most; value += step) {
+    context.globalAlpha = 1;
+    context.fillText(signed(value).replace(".00", ""), left - 6, y(value) + 4);
+    context.globalAlpha = value ? 0.12 : 0.6;
+    line(context, [[left, y(value)], [right, y(value)]]);
+  }
+  if (selected >= 0) {
+    context.globalAlpha = 0.25;
+    context.fillRect(x(selected) - 2.5, top, 5, bottom - top);
+  }
+  effects.forEach(({ mean, half, outcome, capped }, rank) => {
+    Object.assign(context, { strokeStyle: OUTCOMES[outcome], fillStyle: OUTCOMES[outcome], globalAlpha: 0.4 });
+    line(context, [[x(rank), y(mean - half)], [x(rank), y(mean + half)]]);
+    context.globalAlpha = 1;
+    context.beginPath();
+    context.arc(x(rank), y(mean), 2.5, 0, 7);
+    if (capped) context.stroke();
+    else context.fill();
   });
 }

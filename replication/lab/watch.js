@@ -122,7 +122,7 @@ function known() {
 }
 
 MAZES.forEach(({ title }, k) => add($("maze"), "option", { value: String(k) }, title));
-add($("maze"), "option", { value: "own" }, "your own");
+add($("maze"), "option", { value: "own" }, "another one");
 $("maze").onchange = () => {
   if ($("maze").value !== "own") redraw(copy(MAZES[Number($("maze").value)]));
 };

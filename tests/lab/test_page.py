@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from importlib import resources
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from replication.files import PROJECT
-from replication.lab.page import DIGITS, FIELDS, SWITCHES, lab_data, lab_page
+from replication.lab.page import SWITCHES, lab_data, lab_page
+from replication.lab.tasks import FIELDS
 from replication.paper.params import Params
 from replication.paper.register import load_choices
 
@@ -33,24 +32,6 @@ def test_the_page_is_one_file(figures: Path | None) -> None:
     assert len(page.encode()) < 200_000
     assert "://" not in page
     assert not re.search(r"@[A-Z]+@|\b(src|href)=", page)
-
-
-def test_every_published_trial_of_the_mazes_is_there() -> None:
-    """Each row of both tables has a place, and there the first digits of its digest."""
-    published = lab_data(FIGURES)["published"]
-    digits = base64.b64decode(published["digests"]).hex()
-    tables = [FIGURES / task / "trials.csv" for task in ("open_maze", "obstacle_maze")]
-    trials = pd.concat([pd.read_csv(table, keep_default_na=False) for table in tables])
-    assert len(digits) == DIGITS * len(trials)
-    by_condition = trials.groupby(["task", "method", "reading", "set"])
-    assert len(published["groups"]) == by_condition.ngroups
-    for group in published["groups"]:
-        names = tuple(group[name] for name in ("task", "method", "reading", "set"))
-        rows = by_condition.get_group(names)
-        at = DIGITS * group["first"]
-        shown = digits[at : at + DIGITS * group["trials"]]
-        assert shown == "".join(text[7 : 7 + DIGITS] for text in rows["digest"])
-        assert set(rows["seed"]) == {group["seed"]}
 
 
 def test_switches_and_parameters_are_those_of_the_register() -> None:
