@@ -148,7 +148,7 @@ function read(text) {
   if (text.length > MOST.bytes) throw new Refusal(`is larger than ${MOST.bytes / 1e6} MB; drop some demos`);
   let data;
   try {
-    data = JSON.parse(text.replace(/^\ufeff/, ""));
+    data = JSON.parse(text);
   } catch {
     throw new Refusal("is not JSON; a demonstration file is one JSON object");
   }

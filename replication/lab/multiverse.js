@@ -68,14 +68,15 @@ function showSpecification() {
   addRow("Iterations", "Published", "Here");
   for (const { name, label } of DATA.methods) {
     const all = iterationsOf(selected.number, name), found = selected.found[name];
-    const ended = found.filter((count) => count).length, wrong = all.findIndex((count, trial) => found[trial] && found[trial] !== count);
+    const ended = found.filter((count) => count !== null).length;
+    const wrong = all.findIndex((count, trial) => ![null, count].includes(found[trial]));
     addRow(label, meanOf(limited(all))[0].toFixed(2), wrong < 0
       ? `${ended} of ${all.length} trials${ended ? ", each as published" : ""}`
       : `✗ trial ${wrong}: ${found[wrong]}, but ${all[wrong]} is published`);
   }
   const { mean, half } = effectOf(selected.number);
   const [x, y] = [claim().x, claim().y].map((method) => selected.found[method]);
-  addRow("Saved [95 % interval]", interval([mean, half]), [...x, ...y].every((count) => count) ? interval(meanOf(savedBy(x, y))) : "");
+  addRow("Saved [95 % interval]", interval([mean, half]), [...x, ...y].includes(null) ? "" : interval(meanOf(savedBy(x, y))));
   $("beside").replaceChildren(table);
 }
 
@@ -89,7 +90,7 @@ const paramsOf = (values) => ({
 const shows = (values, kind) => values["INCORRECT-KINDS"] === "all" || values["INCORRECT-KINDS"].split("+").includes(kind);
 
 function select(rank) {
-  const found = Object.fromEntries(DATA.methods.map(({ name }) => [name, new Array(verse.trials).fill(0)]));
+  const found = Object.fromEntries(DATA.methods.map(({ name }) => [name, new Array(verse.trials).fill(null)]));
   selected = { ...effects[rank], found };
   showSpecification();
 }

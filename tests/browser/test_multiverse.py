@@ -13,15 +13,18 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from replication.evidence.sensitivity import level_table, outcome_shares
-from replication.evidence.specifications import load_specifications, named_choices
+from replication.evidence.specifications import named_choices
+from replication.evidence.sweep import PLAN, conditions_of, specifications
 from replication.files import PROJECT
 from replication.irl import METHODS
 from replication.lab.multiverse import CLAIMS
 from replication.lab.page import lab_page
+from replication.lab.tasks import FIELDS
+from tests.browser.computing import computed, task_of
 from tests.browser.screen import NARROW, PATIENCE, Open
 
 FIGURES = PROJECT / "figures"
-FACTORS = load_specifications().mazes.factorial.choices
+FACTORS = PLAN.mazes.factorial.choices
 RUNNING = 6 * PATIENCE
 """Milliseconds in which the trials of a specification end on any machine."""
 
@@ -173,6 +176,26 @@ def test_a_specification_runs_as_published(lab: Page, effects: pd.DataFrame) -> 
     lab.locator("#rank").press("Home")
     assert lab.locator("#ranked").inner_text() == "1 of 240"
     ran(lab)
+
+
+@pytest.mark.parametrize("rule", FACTORS["ADABOOST-RULE"])
+def test_every_rule_of_adaboost_has_the_published_bits(lab: Page, rule: str) -> None:
+    """Of each reading of AdaBoost-IRL, some specifications' first trials have their digests."""
+    trials = pd.read_csv(FIGURES / "sensitivity" / "trials.csv")
+    trials = trials[(trials["part"] == "factorial") & (trials["method"] == "adaboost")]
+    trials = trials[trials["trial"] == 0].set_index("number")
+    jobs: list[dict[str, Any]] = []
+    expected = []
+    for number, specification in enumerate(specifications("factorial")):
+        if len(jobs) < 4 and ("ADABOOST-RULE", rule) in specification.choices:
+            condition = conditions_of("factorial", number)[0]
+            values = condition.params.values()
+            params = {name: values[name] for name in FIELDS}
+            job = {"task": task_of(condition.demos), "method": "adaboost", "params": params}
+            jobs.append({**job, "root": PLAN.root_seed, "trial": 0})
+            row = trials.loc[number]
+            expected.append([row["iterations"], row["steps"], row["digest"]])
+    assert computed(lab, jobs, plainly=False) == expected
 
 
 def test_a_first_trial_can_be_watched(open_page: Open, effects: pd.DataFrame) -> None:
