@@ -106,7 +106,7 @@ function runSpecification() {
     for (const { name } of DATA.methods)
       universes.run({ task, method: name, params: { ...DATA.params, ...paramsOf(values) }, root: verse.seed, trial }).then((done) => {
         found[name][trial] = done.converged ? done.iterations : verse.cap + 1;
-        if (found === selected.found) showSpecification();
+        showSpecification();
       });
 }
 
