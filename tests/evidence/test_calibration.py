@@ -334,6 +334,15 @@ def test_border_of_what_fits(off: float) -> None:
         assert table["fits"].tolist() == [off < 0]
 
 
+def test_the_borders_themselves_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mean and an SD that are predicted to the bit are within the prediction."""
+    counts = sample(PAIR.mean, PAIR.sd, 50)
+    mean, sd = counts.mean(), counts.std(ddof=1)
+    monkeypatch.setattr(calibration, "mean_prediction", lambda *_: (mean, mean))
+    monkeypatch.setattr(calibration, "sd_prediction", lambda *_: (sd, sd))
+    assert calibration_table(trials_of("final", 0, counts), "final")["fits"].tolist() == [True]
+
+
 # --- what is run -----------------------------------------------------------------------------
 
 

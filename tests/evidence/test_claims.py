@@ -200,7 +200,7 @@ def test_criteria_do_not_change_with_words(edited: Edit, name: str, old: str, ne
         ('y = "adaboost"', "", ["claim FASTER", "needs y"]),
         ('y = "adaboost"', 'y = "unified"', ["claim FASTER: x and y are both 'unified'"]),
         ("adaboost = [44.94", "boosting = [44.94", ["claim FASTER", "no method 'boosting'"]),
-        ("[44.94, 10.27, 100]", "[44.94, 10.27]", ["claim FASTER.paper.adaboost"]),
+        ("[44.94, 10.27, 100]", "[44.94, 10.27]", ["claim FASTER.paper.adaboost", "required"]),
         ("adaboost = [44.94, 10.27, 100]", "", ["claim FASTER", "both 'unified' and 'adaboost'"]),
         ('place = "Table I, Fig. 6"', "", ["claim FASTER.place", "required"]),
         ('measure = "iterations"', "", ["claim FASTER.measure", "required"]),
@@ -241,6 +241,7 @@ def test_bad_entry_is_one_line(old: str, new: str, named: list[str]) -> None:
     assert "\n" not in said
     for part in named:
         assert part in said
+    assert said.endswith("required") == ("required" in named)
 
 
 def test_published_statistic_needs_its_numbers() -> None:

@@ -167,7 +167,7 @@ def test_a_damaged_file_is_one_line(table: Path, content: bytes, message: str) -
     [
         ("small,unified,printed,none,one,4", "invalid literal"),
         ("small,unified,printed,none,,4", "invalid literal"),
-        ("small,unified,printed,none,0,-4", "impossible number"),
+        ("small,unified,printed,none,0,-4", ": its trial or seed has an impossible number"),
         ("small,unified,printed,none,1000000000,4", "impossible number"),
         ("small,unheard,printed,none,0,4", "unheard"),
         ("small,unified,unheard,none,0,4", "unheard"),
@@ -261,6 +261,13 @@ def test_what_was_not_declared_has_no_condition(part: str, number: str) -> None:
     row = {"part": part, "number": number, "task": "open-maze", "method": "unified"}
     with pytest.raises(LookupError):
         declared_condition(row | {"reading": "printed", "set": "none"})
+
+
+def test_a_condition_of_another_part_is_named() -> None:
+    """A method, reading and set that are not among those of the part and number are refused."""
+    row = {"part": "mazes", "number": "0", "task": "open-maze", "method": "unified"}
+    with pytest.raises(LookupError, match=r"^mazes 0 has no open-maze unified printed all$"):
+        declared_condition(row | {"reading": "printed", "set": "all"})
 
 
 @pytest.mark.parametrize("task", list(EXPERIMENTS))

@@ -27,6 +27,7 @@ from replication.evidence.sensitivity import (
     neutral,
     outcome_shares,
     shares_table,
+    unchanged,
 )
 from replication.evidence.specifications import Specification
 from replication.evidence.statistics import mean_interval, sd_ratio_interval, share_interval
@@ -252,6 +253,9 @@ def test_table_of_shares_has_the_outcomes_too() -> None:
     specifications = crossed(times=10)
     made = np.random.default_rng(3).normal(size=len(specifications))
     table = effects(specifications, made, half=0.5).assign(capped=np.arange(len(made)) % 3)
+    assert shares_table(table).index.is_unique
+    assert not unchanged(table).any()  # as the default is not among them
+    assert unchanged(table).dtype == bool
     shares = shares_table(table).set_index("choice")
     assert shares.index.tolist() == [*CHOICES, NOISE, REST, HOLDS, OPEN, REVERSED]
     assert shares.loc[[HOLDS, OPEN, REVERSED], "share"].sum() == pytest.approx(1.0)

@@ -100,6 +100,7 @@ def test_numbers_save_against_none(small_demos: Demos, tiny: Run) -> None:
         assert row.saved_low <= row.saved <= row.saved_high
         near = pairs_near(conditions[row.number, row.reading].selected)
         assert (row.pairs, row.leaving) == (near["pairs"], near["leaving"])
+        assert row.capped == (measured[places[row.number, row.reading]]["converged"] == 0).sum()
     first = table[table["number"] == 0]
     assert (first[["pairs", "saved", "saved_low", "saved_high"]] == 0).all(axis=None)
 
