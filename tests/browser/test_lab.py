@@ -608,6 +608,18 @@ def test_a_changed_maze_loses_its_name(lab: Page) -> None:
     assert lab.locator("#task").input_value() == "open-maze"
 
 
+def test_a_map_grows_by_free_cells(lab: Page) -> None:
+    """Another size keeps what fits, its new cells are free, and demonstrations begin anew."""
+    empty(lab)
+    for name, size in (("rows", "3"), ("columns", "5")):
+        lab.locator(f"#{name}").fill(size)
+        lab.locator(f"#{name}").press("Tab")
+        expect(lab.locator("#verdict")).to_contain_text("there is no correct demo")
+    lab.locator("#columns").fill("2")
+    lab.locator("#columns").press("Tab")
+    expect(lab.locator("#verdict")).to_contain_text("the map has no goal")
+
+
 def test_a_kind_that_no_file_may_have_is_refused(lab: Page) -> None:
     """The kind of a mistake is checked before it is kept."""
     empty(lab)
