@@ -695,7 +695,7 @@ def test_it_is_one_small_file_for_itself(open_page: Open, tmp_path: Path) -> Non
     command = [sys.executable, "-m", "replication", "lab", "--out", str(file)]
     subprocess.run(command, check=True, capture_output=True)
     assert file.stat().st_size < 200_000
-    page = open_page("lab")
+    page = open_page("index")
     page.goto(file.as_uri())
     ended(page)
     assert page.evaluate("performance.getEntriesByType('resource').length") <= 1  # its worker
