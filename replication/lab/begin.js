@@ -10,6 +10,7 @@ for (const [id, entries] of [
     add(entry, "i", { style: `background: ${color}` });
     entry.append(words);
   }
+$("waiting").remove();
 $("lab").hidden = false;
 choose({});
 redraw(drawing, { remember: false });

@@ -43,14 +43,17 @@ def lab_part(figures: Path | None = None) -> str:
         Folder of the published results, whose trials can then be checked.
     """
     worker = ("numbers", "learner", "irl", "worker")
-    page = ("maze", "pictures", "app", "pool", "watch", "editor", "many", "multiverse")
+    page = (
+        *("maze", "pictures", "app", "pool"),
+        *("watch", "editor", "many", "multiverse", "published", "begin"),
+    )
     data = json.dumps(lab_data(figures), ensure_ascii=False, separators=(",", ":"))
     parts = {
         "STYLE": _text("lab.css"),
         "DIGITS": str(DIGITS),
         "DATA": base64.b64encode(zlib.compress(data.encode(), 9)).decode(),
         "WORKER": _scripts(worker),
-        "PAGE": _scripts((*page, "published", "begin")),
+        "PAGE": _scripts(page),
     }
     text = _text("lab.html")
     for name, part in parts.items():
