@@ -49,6 +49,8 @@ def test_iterations_are_those_published() -> None:
 
 def test_conditions_are_those_of_python() -> None:
     """Drawing and parameters of every specification are those that its trials had."""
+    unnamed = [choice["id"] for choice in DATA["choices"] if not choice["field"]]
+    assert unnamed == [*TASK, "INCORRECT-KINDS"]
     for number, specification in enumerate(SPECIFICATIONS):
         values = dict(specification.choices)
         condition = conditions_of("factorial", number)[-1]
