@@ -169,15 +169,9 @@ class Display:
         Number of notebooks to come.
     bars
         Whether to draw a bar on stderr; otherwise each tenth of the trials has a line there.
-
-    Attributes
-    ----------
-    computed
-        How many trials the notebook that is running has computed.
     """
 
     def __init__(self, notebooks: int, *, bars: bool) -> None:
-        self.computed = 0
         self._notebooks, self._number = notebooks, 0
         self._bars = bars
         self._bar = tqdm(disable=True)
@@ -192,7 +186,6 @@ class Display:
 
     def begin(self, name: str) -> None:
         """Name the notebook that is running."""
-        self.computed = 0
         self._number += 1
         of = f" ({self._number} of {self._notebooks})" if self._notebooks > 1 else ""
         self._bar = tqdm(
@@ -220,7 +213,6 @@ class Display:
             self._began, self._tenth, self._count = began, 0, Count(total)
         more = trials - self._count.trials
         if more > 0:
-            self.computed += more
             self._count.add(more, steps - self._count.steps)
             self.show(self._count)
 

@@ -202,10 +202,19 @@ def _way(maze: Maze, source: int, target: int, avoid: set[int]) -> list[int] | N
     Among the shortest it is one with the fewest turns; ties in the order of the actions.
     """
     next_state = maze.next_state.tolist()
+    moves = {target: 0}  # from a state to the target, as all moves can be undone
+    waiting = [target]
+    for state in waiting:  # it grows meanwhile
+        for there in next_state[state]:
+            if there not in moves and there not in avoid:
+                moves[there] = moves[state] + 1
+                waiting.append(there)
+    if source not in moves or target in avoid:
+        return None
     done: set[tuple[int, int]] = set()
-    heap: list[tuple[int, int, list[int], int]] = [(0, 0, [], source)]
-    while heap:
-        moves, turns, actions, state = heappop(heap)
+    heap: list[tuple[int, list[int], int]] = [(0, [], source)]
+    while True:
+        turns, actions, state = heappop(heap)
         if state == target:
             return actions
         last = actions[-1] if actions else -1
@@ -213,7 +222,5 @@ def _way(maze: Maze, source: int, target: int, avoid: set[int]) -> list[int] | N
             continue
         done.add((state, last))
         for action, there in enumerate(next_state[state]):
-            if there != state and there not in avoid and (there, action) not in done:
-                turned = last not in (-1, action)
-                heappush(heap, (moves + 1, turns + turned, [*actions, action], there))
-    return None
+            if moves.get(there) == moves[state] - 1:
+                heappush(heap, (turns + (last not in (-1, action)), [*actions, action], there))

@@ -195,6 +195,12 @@ def finalists(table: pd.DataFrame) -> list[Point]:
     return found
 
 
+def left_out(table: pd.DataFrame) -> int:
+    """Return how many points fit in the first stage, given its table, and do not go on."""
+    best = finalists(table)
+    return sum(_point(row) not in best for _, row in table[table["fits"]].iterrows())
+
+
 def nearest(table: pd.DataFrame) -> dict[str, Point]:
     """Return the point of each trace that the rule takes, given the table of the second stage."""
     if not table["fits"].any():

@@ -122,16 +122,15 @@ def comparison_table(trials: pd.DataFrame) -> pd.DataFrame:
         trials; `reached`, the share of them with d = 0; means with their 95 % intervals of `d` at
         the end, `iterations` and `steps` of learning; `plans`, how often a method without a loop
         planned, beside the iterations of one that plans inside; `saved`, the mean number of
-        iterations that it took fewer than without incorrect demonstrations, over the same seeds.
+        iterations that it took fewer than without incorrect demonstrations, over the same seeds;
+        `over_printed` and `over_updated`, how many more than the unified method without them.
     """
+    own_trials = trials[trials["part"] == PART].sort_values(["number", "trial"])
+    of = dict(zip(conditions(), (own for _, own in own_trials.groupby("number")), strict=True))
+    counts = {setting: own["iterations"].to_numpy(float) for setting, own in of.items()}
     rows = []
-    counts: dict[Setting, Any] = {}
-    for setting, (number, own) in zip(
-        conditions(), trials[trials["part"] == PART].groupby("number"), strict=True
-    ):
-        condition = list(conditions().values())[int(number)]
-        own = own.sort_values("trial")
-        counts[setting] = own["iterations"].to_numpy(float)
+    for setting, condition in conditions().items():
+        own = of[setting]
         d = np.array([history[-1] for history in numbers_in(own["errors"])])
         row = {
             **setting._asdict(),
@@ -148,6 +147,10 @@ def comparison_table(trials: pd.DataFrame) -> pd.DataFrame:
         without = setting._replace(method=_without(condition.named), set=NONE)
         if setting.set != NONE and without in counts:
             row |= _mean("saved", counts[without] - counts[setting])
+        for trace in TRACES:
+            unified = setting._replace(method="unified", reading=trace, set=NONE)
+            if unified in counts:
+                row |= _mean(f"over_{trace}", counts[setting] - counts[unified])
         rows.append(row)
     return pd.DataFrame(rows)
 

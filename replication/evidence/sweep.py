@@ -170,21 +170,6 @@ def ablations_table(trials: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def trace_gain(trials: pd.DataFrame, table: pd.DataFrame) -> dict[str, float]:
-    """Return how many iterations more F = 1 for ever needs than F_(i+1), over the same seeds.
-
-    `table` is that of :func:`ablations_table`, whose rows are the conditions of the `trials`.
-    """
-    own = table[(table["method"] == "unified") & (table["reading"] == "updated")]
-    usual, ever = (
-        trials.loc[trials["number"] == own.index[own["choices"] == name].item(), "iterations"]
-        for name in ("default", "ALPHA=0.0 F-START=1.0")
-    )
-    more = ever.to_numpy(float) - usual.to_numpy(float)
-    low, high = map(float, mean_interval(more))
-    return {"mean": float(more.mean()), "low": low, "high": high}
-
-
 def numbers_table(
     trials: pd.DataFrame, conditions: Mapping[tuple[int, str], Condition], *, paper: float
 ) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """The table of contents of the published folders: README.md, generated beside them.
 
-Each notebook has a section with its seed, numbers of trials and run time. Each of its figures,
+Each notebook has a section with its seed and numbers of trials. Each of its figures,
 tables and data files has a row: what readers call it, which leads to it, and its other files.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from replication.files import FileError, read_json, read_text, write_file
 from replication.pipeline.declaration import EXECUTED
-from replication.pipeline.manifest import published_folders, read_runs
+from replication.pipeline.manifest import published_folders
 
 INDEX = "README.md"
 
@@ -43,7 +43,7 @@ def index_texts(out: Path) -> tuple[str, str]:
         before = read_text(out / INDEX)
     except FileError:  # whatever is there is replaced
         before = ""
-    sections = [_section(out, *item, before) for item in published_folders(out).items()]
+    sections = [_section(out, *item) for item in published_folders(out).items()]
     return before, "\n".join([HEAD, *sections])
 
 
@@ -76,12 +76,8 @@ def label(name: str, heading: str) -> str:
     return f"{head}, {more.replace('_', ' ')}" if more else head
 
 
-def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str) -> str:
-    """Return the section of a notebook, in the order in which it shows its outputs.
-
-    The run time of a notebook with trials is that of a run that computed some. Where this machine
-    has no record of one, it is what the page states, if anything.
-    """
+def _section(out: Path, notebook: str, manifest: Mapping[str, Any]) -> str:
+    """Return the section of a notebook, in the order in which it shows its outputs."""
     stems: dict[str, list[str]] = {}
     for name in sorted(manifest["outputs"].keys() - {EXECUTED}):
         stems.setdefault(name.partition(".")[0], []).append(name)
@@ -96,13 +92,6 @@ def _section(out: Path, notebook: str, manifest: Mapping[str, Any], before: str)
         if name == "seed" or name.endswith("trials")
     ]
     title = f"## [{notebook}]({notebook}/{EXECUTED})\n\n"
-    run = read_runs(out).get(notebook)
-    stated = re.search(rf"{re.escape(title)}.*(run time .+)", before)
-    counts_trials = any(name.endswith("trials") for name in parameters)
-    if run and (run.get("computed") or not counts_trials):
-        facts.append(f"run time {_time(run['seconds'])}")
-    elif stated:
-        facts.append(stated[1])
     rows = [
         _row(notebook, label(stem, shown.get(stem, "")), stems[stem])
         for stem in [*(s for s in shown if s in stems), *sorted(stems.keys() - shown.keys())]
@@ -117,7 +106,3 @@ def _row(notebook: str, what: str, names: list[str]) -> str:
     first = next((suffix for suffix in FIRST if suffix in files), next(iter(files)))
     others = ", ".join(f"[{suffix}]({files[suffix]})" for suffix in files if suffix != first)
     return f"| [{what}]({files[first]}) | {others} |"
-
-
-def _time(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"

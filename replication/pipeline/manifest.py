@@ -159,15 +159,14 @@ def read_runs(out: Path) -> dict[str, Any]:
     return {name: entry for name, entry in runs.items() if _is_run(entry)}
 
 
-def record_run(out: Path, name: str, seconds: float, computed: int) -> None:
-    """Record a notebook's last run: its time, how many trials it computed, commit and machine."""
+def record_run(out: Path, name: str, seconds: float) -> None:
+    """Record a notebook's last run: its time, commit and machine."""
     git = [_git("rev-parse", "HEAD"), _git("status", "--porcelain")]
     entry = {
         "commit": git[0] or "",
         "clean": git[1] == "",
         "machine": f"{platform.system()} {platform.machine()}, {joblib.cpu_count()} cores",
         "seconds": round(seconds, 1),
-        "computed": computed,
         "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }
     runs = read_runs(out) | {name: entry}

@@ -226,7 +226,7 @@ def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:
         except OSError as error:
             raise unpublished(run, error) from error
     seconds = time.monotonic() - began
-    record_run(run.out, run.name, seconds, options["display"].computed)
+    record_run(run.out, run.name, seconds)
     failed.unlink(missing_ok=True)
     number = len(notebook.declared.outputs)
     compared = "" if differ is None else "; all bytes as before"

@@ -95,7 +95,7 @@ def draw_comparison(numbers: pd.DataFrame) -> Figure:
     axes[0].set_yticks(range(len(keys)), [short_label(*key) for key in keys], size=7.5)
     axes[0].set_ylim(len(keys) - 0.4, -0.6)
     _scale(axes[0], "(a) distance d at the end", 0.1, [0, 0.1, 1, 5])
-    _scale(axes[1], "(b) iterations", 1, [0, 1, 10, 100, 300])
+    _scale(axes[1], "(b) iterations", 1, [0, 1, 10, 100])
     _scale(axes[2], "(c) steps in the environment", 1e4, [0, 1e4, 1e5, 1e6, 1e7, 1e8])
     for panel in axes:
         panel.grid(axis="y", color="0.92", lw=0.6)
@@ -111,12 +111,15 @@ def draw_comparison(numbers: pd.DataFrame) -> Figure:
 def _scale(panel: Axes, title: str, linear: float, ticks: list[float]) -> None:
     """Let a panel begin at zero and go on by powers."""
     panel.set_title(title, size=8, loc="left")
+    names = {
+        tick: f"{tick:g}" if tick < 1000 else f"$10^{{{np.log10(tick):.0f}}}$" for tick in ticks
+    }
+    panel.set_xlabel(f"log axis from {names[linear]} on", size=7)
     panel.set_xscale("symlog", linthresh=linear, linscale=0.5)
     panel.set_xlim(-0.1 * linear, None)
     panel.xaxis.set_major_locator(FixedLocator(ticks))
     panel.xaxis.set_minor_locator(NullLocator())
-    names = [f"{tick:g}" if tick < 1000 else f"$10^{{{np.log10(tick):.0f}}}$" for tick in ticks]
-    panel.set_xticks(ticks, names)
+    panel.set_xticks(ticks, names.values())
 
 
 def readable_comparison(table: pd.DataFrame) -> pd.DataFrame:

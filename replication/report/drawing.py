@@ -103,7 +103,7 @@ def scale(panel: Axes, name: str, statistic: str, effects: pd.Series) -> None:
     elif size.max() > FAR * size.quantile(0.75) > 0:
         linear = 10.0 ** np.ceil(np.log10(size.quantile(0.75)))
         getattr(panel, f"set_{name}scale")("symlog", linthresh=linear)
-        axis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}"))
+        axis.set_major_formatter(lambda value, _: f"{value:,g}".replace("-", "\N{MINUS SIGN}"))
         axis.set_minor_locator(NullLocator())
     else:
         axis.set_major_locator(MaxNLocator(4 if name == "x" else 6, steps=[1, 2, 2.5, 5, 10]))
@@ -113,7 +113,10 @@ def unit(panel: Axes, name: str, statistic: str, measure: str) -> str:
     """Return the unit of an axis, and where its scale is logarithmic."""
     kind = getattr(panel, f"get_{name}scale")()
     transform: Any = getattr(panel, f"{name}axis").get_transform()
-    where = {"log": ", log axis", "symlog": f", log beyond ±{getattr(transform, 'linthresh', 0):g}"}
+    where = {
+        "log": ", log axis",
+        "symlog": f", log beyond ±{getattr(transform, 'linthresh', 0):,g}",
+    }
     return UNITS[statistic, measure] + where.get(kind, "")
 
 

@@ -16,6 +16,7 @@ from replication.evidence.claims import Claims, criteria_hash, load_claims, shor
 from replication.evidence.rounding import LEVEL, chosen_tolerance
 from replication.evidence.sensitivity import (
     HOLDS,
+    NOISE,
     OPEN,
     REVERSED,
     UNDEFINED,
@@ -31,8 +32,8 @@ from replication.paper.register import load_choices
 from replication.report.choices import NAMES, value
 from replication.report.readable import F_LABELS, full_label
 
-MATTERS = 0.05
-"""Share of the variance from which on a choice is named in words."""
+MATTERS, MOSTLY = 0.05, 0.5
+"""From which share of the variance on a choice is named in words, or chance alone."""
 
 
 # --- below the verdicts --------------------------------------------------------------------------
@@ -68,7 +69,8 @@ def rounded(table: pd.DataFrame) -> str:
     others = table[table["arithmetic"] != "double"]
     none = others[others["tolerance"] == 0]
     most = none.loc[none["difference"].abs().idxmax()]
-    same = others[(others["arithmetic"] == "fused") & (others["tolerance"] > 0)]["equal"].min()
+    fused = others[(others["arithmetic"] == "fused") & (others["tolerance"] > 0)]["equal"].min()
+    same = "all" if fused == 1 else f"at least {fused:.0%} of the"
     failing = [f"{t:g}" for t, rows in others.groupby("tolerance") if rows["p_holm"].min() < LEVEL]
     if taken is None:
         rule = "At none of them is there no difference"
@@ -80,7 +82,7 @@ def rounded(table: pd.DataFrame) -> str:
     return (
         f"Without a tolerance the mean changes by up to {abs(most.difference):.1f} iterations "
         f"({full_label(most.method, most.reading)}, {most.arithmetic}, {most.task}). With any of "
-        f"the tolerances at least {same:.0%} of the trials of a setting have the same number of "
+        f"the tolerances {same} trials of a setting have the same number of "
         f"iterations in double and fused arithmetic. A difference is shown at a tolerance of "
         f"{', '.join(failing) or 'none'}. {rule}. In single precision, in which values differ by "
         f"more than a small tolerance, at least so many trials have the same number: "
@@ -137,13 +139,16 @@ def dependence(effects: pd.DataFrame) -> str:
 def at_once(effects: pd.DataFrame) -> list[str]:
     """Return in words what each claim depends on when all choices vary, a sentence or two each."""
     levels, shares = level_table(effects), shares_table(effects)
+    noise = shares[shares["choice"] == NOISE].set_index("claim")["share"]
     shares = shares[shares["choice"].isin(NAMES)]
     lines = []
     for row in outcome_shares(effects).itertuples():
         part = effects[effects["claim"] == row.claim]
         line = f"{_title(row.claim)}: {_outcomes(row)}{_caps(row, part)}"
         for most in shares[shares["claim"] == row.claim].nlargest(1, "share").itertuples():
-            if most.share > MATTERS:
+            if noise[row.claim] > MOSTLY:
+                line += f" No choice stands out: {noise[row.claim]:.0%} of the variance is chance."
+            elif most.share > MATTERS:
                 line += f" It depends most on {NAMES[most.choice]}: {most.share:.0%} of the "
                 line += "variance of the effect"
                 if row.with_caps and not np.isnan(most.share_uncapped):
@@ -232,22 +237,24 @@ def _by_value(levels: pd.DataFrame, part: pd.DataFrame, claim: str, choice: str)
 
 
 STEADY = 0.9
-"""Share of the specifications that must agree with a finding, for it to be robust."""
+"""Share of the specifications that must not speak against a finding."""
 
-ROBUST, FRAGILE, NOT_TESTED = "robust", "fragile", "not tested"
+ROBUST, UNOPPOSED, FRAGILE, NOT_TESTED = "robust", "not contradicted", "fragile", "not tested"
 
 
 def robustness(judged: pd.DataFrame, holds: int, count: int) -> str:
-    """Say in one word whether a finding is the same in other cells and with other choices.
+    """Say in a word or two whether a finding is the same in other cells and with other choices.
 
-    It is robust if all cells have one verdict that is settled, and nine of ten specifications
-    agree: the claim holds in them if it is shown, and does not if it is not.
+    A claim that is shown in all cells is robust if it holds in nine of ten specifications. One that
+    is absent or reversed in all of them is not contradicted if it does not hold in nine of ten: the
+    few trials of a specification cannot confirm an absence.
     """
-    share = holds / count
-    agree = share if (judged["verdict"] == SHOWN).all() else 1 - share
-    unsettled = judged["verdict"].isin([INCONCLUSIVE, NOT_TESTABLE]).any()
-    same = judged["verdict"].nunique() == 1
-    return ROBUST if same and not unsettled and agree >= STEADY else FRAGILE
+    verdict = judged["verdict"].iloc[0]
+    if judged["verdict"].nunique() > 1 or verdict in (INCONCLUSIVE, NOT_TESTABLE):
+        return FRAGILE
+    if verdict == SHOWN:
+        return ROBUST if holds >= STEADY * count else FRAGILE
+    return UNOPPOSED if count - holds >= STEADY * count else FRAGILE
 
 
 def held(effects: pd.DataFrame, id: str) -> tuple[int, int]:

@@ -259,15 +259,59 @@ def _of_set(rows: pd.DataFrame) -> str:
     return ", ".join(parts)
 
 
+def consistency(rows: pd.DataFrame) -> str:
+    """Say in which cells an effect is consistent with the paper's; where not, on which side."""
+    names = {"yes": "consistent with it", "larger": "larger", "smaller": "smaller"}
+    cells: dict[str, list[str]] = {}
+    for row in rows.itertuples():
+        reading = F_LABELS[row.reading].split(" (")[0]
+        place = PLACES.get(row.id, "") if rows["id"].nunique() > 1 else ""
+        cells.setdefault(_size(row), []).append(f"{reading}{place}")
+    if len(cells) == 1:
+        return names[next(iter(cells))] + (" under every reading" if len(rows) > 1 else "")
+    parts = [f"{text} under {_listed(cells[key])}" for key, text in names.items() if key in cells]
+    return ", and ".join(parts)
+
+
+def _listed(words: list[str]) -> str:
+    *most, last = words
+    return f"{'; '.join(most)} and {last}" if most else last
+
+
+PLACES = {"SAVES-OPEN": " (open)", "SAVES-OBSTACLES": " (obstacles)"}
+
+
+def _size(row: Any) -> str:
+    """Return "yes" if an effect is consistent with the paper's, or else what it is beside it.
+
+    A ratio of SDs is an effect the larger the farther it is below 1.
+    """
+    if row.consistent != "no":
+        return str(row.consistent)
+    beyond = row.effect > row.predicted_high
+    return "larger" if beyond != (row.statistic == "sd-ratio") else "smaller"
+
+
 def readable_predictions(table: pd.DataFrame) -> pd.DataFrame:
-    """Return what was predicted for each claim, beside what came out."""
+    """Return what was predicted for each claim, beside what came out.
+
+    An effect that the paper reports, too, is also held against the paper's.
+    """
     rows = []
     for id, part in table.groupby("id", sort=False):
         claim = load_claims().by_id(str(id))
         if claim.prediction:
-            rows.append(
-                {"Claim": label(str(id)), "Predicted": claim.prediction, "Came out": sentence(part)}
-            )
+            like = claim.prediction.removeprefix("as ")
+            predicted = f"as for: {LABELS[like]}" if like in LABELS else claim.prediction
+            row = {"Claim": LABELS.get(claim.id, claim.claim), "Predicted": predicted}
+            row |= {"Came out": sentence(part), "Beside the paper's": "–"}
+            if (part["consistent"] != "").all():
+                texts = [
+                    f"{SET_LABELS[set]}: ".removeprefix("–: ") + consistency(own)
+                    for set, own in part.groupby("set", sort=False)
+                ]
+                row["Beside the paper's"] = "; ".join(texts)
+            rows.append(row)
     return pd.DataFrame(rows)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -69,7 +68,7 @@ def draw_curve(numbers: pd.DataFrame) -> Figure:
     (top, corner), (matrix, shares) = grid
     claim = load_claims().by_id(factorial["claim"].iloc[0]).claim
     title: dict[str, Any] = {"x": 0.004, "ha": "left", "size": 9, "weight": "bold"}
-    figure.suptitle(drawing.statement(claim), **title)
+    figure.suptitle(f"The claim: {drawing.statement(claim)}", **title)
     _draw_effects(top, factorial.iloc[0], part)
     corner.set_axis_off()
     for row in default.dropna(subset="effect").itertuples():
@@ -113,7 +112,8 @@ def _draw_effects(panel: Axes, first: pd.Series, part: pd.DataFrame) -> None:
     panel.axhline(first["neutral"], color="0.25", lw=1, zorder=1)
     panel.set_xlim(-1.5, len(part) + 0.5)
     name = drawing.unit(panel, "y", first["statistic"], first["measure"])
-    panel.set_ylabel(f"{textwrap.fill(name, 34)}\n(95 % interval)", size=8)
+    name = name.replace(", log", ",\nlog")
+    panel.set_ylabel(f"{name}\n(95 % interval)", size=8)
     panel.tick_params(axis="x", bottom=False)
     if len(part):
         place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}

@@ -58,7 +58,7 @@ def draw_numbers(numbers: pd.DataFrame) -> Figure:
         axes.xaxis.set_minor_locator(NullLocator())
     above.spines["top"].set_visible(True)
     above.set_xlabel("incorrect demonstrations")
-    panel.set_xlabel("pairs of state and action that they mark (log axis)")
+    panel.set_xlabel(f"pairs of state and action that they mark (log axis from {linear:g} on)")
     panel.set_ylabel("iterations saved, same seeds")
     low, high = numbers["saved_low"].min(), max(numbers["saved_high"].max(), paper)
     panel.set_ylim(low - 0.04 * (high - low), high + 0.04 * (high - low))

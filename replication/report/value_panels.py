@@ -21,7 +21,7 @@ from replication.report.maze import ticks
 from replication.report.readable import F_LABELS
 from replication.report.style import WIDTH, settled
 
-SURFACES = {"q_mid": "(a)", "q_end": "(b)", "reward_end": "(d)"}
+SURFACES = {"q_mid": "(a) Q", "q_end": "(b) Q", "reward_end": "(d) reward"}
 HEIGHT = 6.5
 LEFT = 0.5  # inches
 
@@ -118,7 +118,7 @@ def _draw_lines(figure: Figure, numbers: pd.DataFrame) -> None:
     low = min(0, *(panel.get_ylim()[0] for panel in levels))
     high = max(panel.get_ylim()[1] for panel in levels)
     for panel in levels:
-        panel.set(ylim=(low, high + 0.25 * (high - low)))  # room for the legend
+        panel.set(ylim=(low, high + 0.4 * (high - low)))  # room for the legend
         panel.tick_params(labelleft=panel is levels[0])
     levels[0].set_ylabel("max Q on the path: mean", size=8)
     middle_half = Patch(color="0.45", alpha=0.3, lw=0, label=f"middle half of {n:.0f} trials")
@@ -178,7 +178,7 @@ def _draw_surfaces(figure: Figure, numbers: pd.DataFrame) -> None:
         size=8,
         va="top",
     )
-    for place, (surface, letter) in enumerate(SURFACES.items()):
+    for place, (surface, title) in enumerate(SURFACES.items()):
         height = grid_of(numbers, surface)
         x, y = np.meshgrid(*(np.arange(n) for n in height.shape[::-1]))
         panel = _axes(figure, 1.5 + 1.8 * place, 0.2, 1.8, 1.35, projection="3d")
@@ -186,7 +186,7 @@ def _draw_surfaces(figure: Figure, numbers: pd.DataFrame) -> None:
         panel.set(xticklabels=[], yticklabels=[], zticklabels=[])
         panel.set_xlabel("x", labelpad=-14, size=7)
         panel.set_ylabel("y", labelpad=-14, size=7)
-        panel.set_title(letter, size=8, y=0.85, x=0.2)
+        panel.set_title(title, size=8, y=0.93, x=0.2)
         panel.set_box_aspect((1, 1, 0.75), zoom=1.05)
         panel.view_init(elev=28, azim=-125)
 

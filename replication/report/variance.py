@@ -37,8 +37,8 @@ BESIDE = {REST: "choices together", NOISE: "few trials"}
 """What the variance is due to beside single choices, in words."""
 
 SHARES = (
-    "A row adds up to 100. Choices together: what no choice explains by itself. Few trials: the "
-    "sampling error of the specifications. <1: also what chance makes slightly negative. A dot: "
+    "Choices together: what no choice explains by itself. Few trials: the sampling error of the "
+    "specifications. <1 may be negative by chance; with such shares a row adds up to 100. A dot: "
     "the choice cannot act on the claim."
 )
 

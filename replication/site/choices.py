@@ -8,10 +8,11 @@ from collections.abc import Iterator
 import pandas as pd
 
 from replication.evidence.claims import load_claims, short_label
+from replication.evidence.sensitivity import NOISE
 from replication.paper.groups import choice_groups
 from replication.paper.register import Choice
 from replication.report.choices import NAMES, title
-from replication.report.findings import MATTERS
+from replication.report.findings import MATTERS, MOSTLY
 from replication.report.readable import markdown
 
 
@@ -35,9 +36,12 @@ def _matter(shares: pd.DataFrame) -> str:
     """Return a table of the choices that were varied, by how much hangs on each of them.
 
     Whether the error falls to zero is left out: only for the other method does anything hang on it.
+    So are claims whose effect varies mostly by chance.
     """
     zero = shares["claim"].map(lambda id: load_claims().by_id(id).statistic == "share")
-    known = shares[shares["choice"].isin(NAMES) & ~zero.astype(bool)]
+    chance = shares.loc[(shares["choice"] == NOISE) & (shares["share"] > MOSTLY), "claim"]
+    left_out = zero.astype(bool) | shares["claim"].isin(chance)
+    known = shares[shares["choice"].isin(NAMES) & ~left_out]
     most = known.groupby("choice")["share"].max().sort_values(ascending=False)
     rows = []
     for id in most[most >= MATTERS].index:

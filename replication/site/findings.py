@@ -13,9 +13,9 @@ import jinja2
 import pandas as pd
 
 from replication import files
+from replication.evidence.calibration import left_out
 from replication.evidence.claims import LABELS, label, load_claims
-from replication.evidence.experiments import GENERAL, NAMED
-from replication.evidence.sweep import trace_gain
+from replication.evidence.experiments import GENERAL, NAMED, NONE
 from replication.evidence.tables import read_table
 from replication.evidence.verdicts import CONSISTENT, INCONSISTENT, SHOWN, by_claim
 from replication.report.findings import (
@@ -27,8 +27,8 @@ from replication.report.findings import (
     shows_opposite,
 )
 from replication.report.readable import (
-    F_LABELS,
     SET_LABELS,
+    consistency,
     markdown,
     p_is,
     readable_verdicts,
@@ -53,6 +53,7 @@ def render_findings(figures: Path) -> tuple[str, str]:
         "fixed": fixed,
         "percent": "{:.0%}".format,
         "interval": interval,
+        "thousands": "{:,.0f}".format,
     }
     template = environment.get_template(TEMPLATE)
     context = numbers(figures)
@@ -73,8 +74,10 @@ def numbers(figures: Path) -> dict[str, Any]:
     in_general = compared["id"].isin(["SAVES-OPEN", "SAVES-OBSTACLES"]) & (
         compared["set"] == GENERAL
     )
-    ablated = read("sensitivity/trials").query("part == 'ablations'")
     levels, pairs = read("sensitivity/levels"), read("sensitivity/numbers")
+    methods, screen, final = (
+        read(name) for name in ("beyond/methods", "calibration/screen", "calibration/final")
+    )
     kinds = levels[(levels["claim"] == "SAVES-OPEN") & (levels["choice"] == "INCORRECT-KINDS")]
     opposite = kinds["value"].map(lambda value: shows_opposite({"INCORRECT-KINDS": value}))
     sentences = {id: sentence(rows) for id, rows in by_claim(judged)}
@@ -82,7 +85,8 @@ def numbers(figures: Path) -> dict[str, Any]:
         name: compared[compared["id"].isin([name, *(f"{name}-{task}" for task in TASKS)])]
         for name in ANSWERED
     }
-    saves = claims["SAVES"]
+    saves, soccer = claims["SAVES"], claims["ERRS"]["task"] == "soccer"
+    claims["ERRS"], errs_in_soccer = claims["ERRS"][~soccer], claims["ERRS"][soccer]
     return {
         "judging": load_claims().judging,
         "sentence": sentences,
@@ -93,6 +97,7 @@ def numbers(figures: Path) -> dict[str, Any]:
             "other": found(saves[saves["set"] == NAMED]),
             "soccer": found(saves[saves["task"] == "soccer"]),
         },
+        "errs_in_soccer": found(errs_in_soccer),
         "range": {
             "FASTER": _range(claims["FASTER"]),
             "SAVES": _range(saves[saves["set"] == GENERAL]),
@@ -105,6 +110,8 @@ def numbers(figures: Path) -> dict[str, Any]:
         "cell": by_key(judged, "id", "set", "reading"),
         "published": len(published),
         "consistent": int((published["verdict"] == CONSISTENT).sum()),
+        "printed": published["id"].nunique(),
+        "met": published.loc[published["verdict"] == CONSISTENT, "id"].nunique(),
         "joint": by_key(factorial.drop_duplicates("claim"), "claim"),
         "outcomes": by_key(read("sensitivity/outcomes"), "group", "claim"),
         "levels": by_key(levels, "claim", "choice", "value"),
@@ -120,16 +127,22 @@ def numbers(figures: Path) -> dict[str, Any]:
         "every_pair": by_key(pairs[pairs["pairs"] == pairs["pairs"].max()], "reading"),
         "contrasts": by_key(read("open_maze/contrasts"), "x", "set", "reading"),
         "summary": by_key(read("open_maze/table1"), "method", "set", "reading"),
-        "points": len(read("calibration/screen")),
-        "nearest": read("calibration/final").iloc[0].to_dict(),
+        "points": len(screen),
+        "screened": int(screen["n"].max()),
+        "finalists": len(final),
+        "left_out": left_out(screen),
+        "nearest": final.iloc[0].to_dict(),
         "rounding": by_key(
             read("rounding/rounding"), "task", "method", "reading", "tolerance", "arithmetic"
         ),
-        "no_trace_updated": trace_gain(ablated, read("sensitivity/ablations")),
-        "consistency": {id: _consistency(rows) for id, rows in by_claim(compared)},
-        "general_size": _consistency(compared[in_general]),
+        "consistency": {
+            id: consistency(rows) for id, rows in by_claim(compared[compared["consistent"] != ""])
+        },
+        "general_size": consistency(compared[in_general]),
         "set_labels": SET_LABELS,
-        "methods": by_key(read("beyond/methods"), "solver", "task", "method", "reading", "set"),
+        "methods": by_key(methods, "solver", "task", "method", "reading", "set"),
+        "projection": _projection(methods),
+        "beginning": by_key(read("beyond/beginning"), "task", "method"),
         "p": p_is,
         "depends": at_once(factorial),
         "chance": chance(factorial),
@@ -139,7 +152,13 @@ def numbers(figures: Path) -> dict[str, Any]:
 TASKS = ("OPEN", "OBSTACLES", "SOCCER")
 """How ids of claims end that are judged on each task."""
 
-ANSWERED = {"ZERO": "ZERO-OPEN", "FASTER": "FASTER", "SAVES": "SAVES-OPEN", "AVOIDS": "AVOIDS-OPEN"}
+ANSWERED = {
+    "ZERO": "ZERO-OPEN",
+    "FASTER": "FASTER",
+    "SAVES": "SAVES-OPEN",
+    "AVOIDS": "AVOIDS-OPEN",
+    "ERRS": "ERRS-OPEN",
+}
 """The claims of the answer, on all tasks, and how the specifications on all maps name them."""
 
 
@@ -162,6 +181,14 @@ def _other(factorial: pd.DataFrame, judged: pd.DataFrame, id: str) -> dict[str, 
     return {"holds": holds, "count": count, "word": robustness(judged, holds, count)}
 
 
+def _projection(methods: pd.DataFrame) -> str:
+    """Return which part of the unified method's iterations projection takes in the mazes."""
+    own = methods[(methods["solver"] == "q-learning") & (methods["task"] != "soccer")]
+    by_method = own[own["set"] == NONE].set_index("task").groupby("method")["iterations"]
+    parts = by_method.get_group("projection") / by_method.get_group("unified")
+    return f"{parts.min():.0%} to {parts.max():.0%}"
+
+
 HOLDING = tuple(id for id in LABELS if not id.startswith("ZERO"))
 """The claims of which the findings say in how many other sets of choices they hold."""
 
@@ -173,36 +200,6 @@ def _on_tasks(name: str, sentences: Mapping[str, str]) -> str:
     if open_maze == obstacles:
         mazes = f"In both mazes: {open_maze}"
     return f"{mazes}. Soccer: {soccer}"
-
-
-def _consistency(rows: pd.DataFrame) -> str:
-    """Say in which cells an effect is consistent with the paper's, and else in which direction."""
-    names = {"yes": "consistent with it", "larger": "larger", "smaller": "smaller"}
-    cells: dict[str, list[str]] = {}
-    for row in rows.itertuples():
-        reading = F_LABELS[row.reading].split(" (")[0]
-        cells.setdefault(_size(row), []).append(f"{reading}{PLACES.get(row.id, '')}")
-    parts = [f"{text} under {_listed(cells[key])}" for key, text in names.items() if key in cells]
-    return ", and ".join(parts)
-
-
-def _listed(words: list[str]) -> str:
-    *most, last = words
-    return f"{'; '.join(most)} and {last}" if most else last
-
-
-PLACES = {"SAVES-OPEN": " (open)", "SAVES-OBSTACLES": " (obstacles)"}
-
-
-def _size(row: Any) -> str:
-    """Return "yes" if an effect is consistent with the paper's, or else what it is beside it.
-
-    A ratio of SDs is an effect the larger the farther it is below 1.
-    """
-    if row.consistent != "no":
-        return str(row.consistent)
-    beyond = row.effect > row.predicted_high
-    return "larger" if beyond != (row.statistic == "sd-ratio") else "smaller"
 
 
 def by_key(table: pd.DataFrame, *keys: str) -> dict[str, Any]:

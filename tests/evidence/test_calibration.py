@@ -30,6 +30,7 @@ from replication.evidence.calibration import (
     finalists,
     judged_table,
     kl_divergence,
+    left_out,
     nearest,
     points,
     rule_follows,
@@ -210,8 +211,12 @@ def test_finalists_by_hand() -> None:
         for trace, first in (("printed", 2), ("updated", 3)):
             expected += world_points(ALL_WORLDS[at], trace)[first : first + 4]
     shuffled = dict(sorted(divergences.items(), key=lambda item: str(item[0])[::-1]))
-    assert finalists(table_of(shuffled)) == expected
+    table = table_of(shuffled)
+    assert finalists(table) == expected
     assert len(expected) == WORLDS * POINTS * len(TRACES) == 40
+    assert left_out(table.assign(fits=True)) == len(table) - 40
+    best = [point in expected for point in table[COLUMNS].itertuples(index=False, name=None)]
+    assert left_out(table.assign(fits=best)) == 0
 
 
 # --- the second stage ------------------------------------------------------------------------

@@ -117,6 +117,21 @@ def test_savings_are_against_the_method_without() -> None:
     assert np.isnan(row(without).saved)
 
 
+def test_each_method_is_held_to_the_unified_one() -> None:
+    """What it needs more is against the unified method under either trace, with the same solver."""
+    for solver in ("q-learning", "planning"):
+        for method in ("perceptron", "adaboost"):
+            setting = Setting("open-maze", method, "", NONE, solver)
+            found = row(setting)
+            for trace in ("printed", "updated"):
+                unified = Setting("open-maze", "unified", trace, NONE, solver)
+                more = COUNTS[setting] - COUNTS[unified]
+                low, high = map(float, mean_interval(more))
+                names = (f"over_{trace}{end}" for end in ("", "_low", "_high"))
+                given = [getattr(found, name) for name in names]
+                assert given == pytest.approx([more.mean(), low, high])
+
+
 def test_plans_are_counted() -> None:
     """Planning inside takes a plan an iteration; what plans beforehand has these besides."""
     learned = Setting("open-maze", "unified", "printed", NONE, "q-learning")

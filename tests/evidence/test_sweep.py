@@ -9,7 +9,7 @@ import pytest
 from replication import Demos
 from replication.evidence import sweep
 from replication.evidence.experiments import NAMED, NONE, conditions_of
-from replication.evidence.sweep import ablations_table, numbers_table, trace_gain
+from replication.evidence.sweep import ablations_table, numbers_table
 from replication.evidence.tables import pairs_near
 from replication.irl import READINGS
 from replication.irl.methods import TRACES
@@ -103,13 +103,3 @@ def test_numbers_save_against_none(small_demos: Demos, tiny: Run) -> None:
         assert row.capped == (measured[places[row.number, row.reading]]["converged"] == 0).sum()
     first = table[table["number"] == 0]
     assert (first[["pairs", "saved", "saved_low", "saved_high"]] == 0).all(axis=None)
-
-
-def test_gain_of_the_trace_is_paired() -> None:
-    """The gain is over the same seeds: iterations with F = 1 for ever, less those with F_(i+1)."""
-    names = ["default", "default", "ALPHA=0.0 F-START=1.0"]
-    readings = ["printed", "updated", "updated"]
-    table = pd.DataFrame({"method": "unified", "reading": readings, "choices": names})
-    counts = [(0, 90), (0, 90), (1, 10), (1, 20), (2, 13), (2, 23)]
-    trials = pd.DataFrame(counts, columns=["number", "iterations"])
-    assert trace_gain(trials, table) == {"mean": 3.0, "low": 3.0, "high": 3.0}

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ from nbformat.v4 import new_output
 
 from replication.pipeline import execute as execution
 from replication.pipeline.index import INDEX, shown_outputs, write_index
-from replication.pipeline.manifest import RUNS
 from replication.pipeline.run import run_notebooks
 from tests.conftest import Spoil
 
@@ -50,22 +48,6 @@ def test_each_output_has_a_row(out: Path) -> None:
         "| [Which mistakes help](toy/sets.md) | [csv](toy/sets.csv) |",
         "| [trials](toy/trials.csv) |  |",
     ]
-
-
-def test_a_run_time_is_kept_where_none_is_recorded(out: Path) -> None:
-    """A fresh clone, or a run that only read finished trials, does not know how long they took."""
-    record = json.loads((out / RUNS).read_text())
-    for computed in (3, 0):
-        record["toy"] |= {"seconds": 754.4 if computed else 1.0, "computed": computed}
-        (out / RUNS).write_text(json.dumps(record))
-        write_index(out)
-        assert lines(out)[1] == "seed 1, trials 3, run time 13 min"
-    (out / RUNS).unlink()
-    write_index(out)
-    assert lines(out)[1] == "seed 1, trials 3, run time 13 min"
-    (out / INDEX).unlink()
-    write_index(out)
-    assert lines(out)[1] == "seed 1, trials 3"
 
 
 def test_a_page_that_is_right_is_not_written(out: Path) -> None:

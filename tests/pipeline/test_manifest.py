@@ -160,7 +160,7 @@ def test_versions_are_named_in_neutral_words() -> None:
 )
 def test_a_record_that_cannot_be_used_counts_as_none(tmp_path: Path, entry: str) -> None:
     """A run that lacks what is shown is not known, and the others are."""
-    manifest.record_run(tmp_path, "b", 1, 0)
+    manifest.record_run(tmp_path, "b", 1)
     path = tmp_path / manifest.RUNS
     path.write_text(path.read_text().replace("{", f'{{"a": {entry}, ', 1))
     assert list(manifest.read_runs(tmp_path)) == ["b"]

@@ -10,11 +10,20 @@ import pytest
 from replication.evidence.calibration import PLAINEST, TRACE, WORLD, chosen, points
 from replication.evidence.claims import criteria_hash, load_claims
 from replication.evidence.rounding import settings, variants
-from replication.evidence.sensitivity import HOLDS, JOINT, OPEN, REVERSED, UNDEFINED
+from replication.evidence.sensitivity import (
+    HOLDS,
+    JOINT,
+    NOISE,
+    OPEN,
+    REVERSED,
+    UNDEFINED,
+    shares_table,
+)
 from replication.evidence.specifications import Specification, load_specifications
 from replication.evidence.verdicts import ABSENT, INCONCLUSIVE, NOT_TESTABLE, SHOWN
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
+from replication.report import findings
 from replication.report.choices import NAMES
 from replication.report.findings import (
     at_once,
@@ -192,6 +201,22 @@ def test_caps_of_the_first_method_are_not_put_on_the_other() -> None:
     assert "AdaBoost-IRL; " not in text
 
 
+def test_no_choice_is_named_where_chance_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If most of the variance is sampling error, this is said instead of the largest share."""
+    table = ruled("FASTER", "saved", {"mismatch": 0.0, "graded": -2.0}).assign(capped=0)
+    for share, named in ((0.4, True), (0.75, False)):
+
+        def shares(effects: pd.DataFrame, share: float = share) -> pd.DataFrame:
+            found = shares_table(effects)
+            found.loc[found["choice"] == NOISE, "share"] = share
+            return found
+
+        monkeypatch.setattr(findings, "shares_table", shares)
+        (text,) = at_once(table)
+        assert ("It depends most on" in text) == named
+        assert text.endswith(" No choice stands out: 75% of the variance is chance.") != named
+
+
 def test_claim_that_depends_on_nothing_is_counted_alone() -> None:
     """Where no choice has a share of the variance none is named; missing effects are counted."""
     table = ruled("STEADIER", "saved", {"mismatch": 1.0, "graded": 1.0})
@@ -329,9 +354,9 @@ def test_the_opposite_direction_is_in_a_set_or_not() -> None:
     [
         ((SHOWN, SHOWN), 9, "robust"),
         ((SHOWN, SHOWN), 8, "fragile"),
-        ((ABSENT, ABSENT), 1, "robust"),
+        ((ABSENT, ABSENT), 1, "not contradicted"),
         ((ABSENT, ABSENT), 2, "fragile"),
-        ((REVERSED,), 0, "robust"),
+        ((REVERSED,), 0, "not contradicted"),
         ((SHOWN, ABSENT), 10, "fragile"),
         ((SHOWN, ABSENT), 0, "fragile"),
         ((INCONCLUSIVE, INCONCLUSIVE), 0, "fragile"),
@@ -339,7 +364,7 @@ def test_the_opposite_direction_is_in_a_set_or_not() -> None:
     ],
 )
 def test_robust_is_what_stays_the_same(verdicts: tuple[str, ...], holds: int, word: str) -> None:
-    """All cells are settled and alike, and nine of ten specifications agree with them."""
+    """All cells are settled and alike, and of ten specifications nine do not speak against them."""
     assert robustness(pd.DataFrame({"verdict": verdicts}), holds, 10) == word
 
 

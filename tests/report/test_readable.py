@@ -23,6 +23,7 @@ from replication.report.readable import (
     F_LABELS,
     MEASURES,
     SET_LABELS,
+    consistency,
     full_label,
     markdown,
     readable_ablations,
@@ -250,10 +251,29 @@ def test_readable_predictions_set_what_was_said_beside_what_came_out() -> None:
     """Each claim that was predicted has a row; one whose number was used up has none."""
     ids = {"A": "FASTER", "B": "STEADIER", "D": "MEAN-ADABOOST-OPEN"}
     judged = JUDGED[JUDGED["id"].isin([*ids])].replace({"id": ids})
+    judged = judged.assign(consistent=["yes", "no", "no", "no", ""])
+    judged["predicted_high"] = [5.0, 2.0, 0.8, 0.8, NAN]
+    beside = {
+        "A": "consistent with it under Fᵢ, and larger under Fᵢ₊₁",
+        "B": "larger under Fᵢ, and smaller under Fᵢ₊₁",
+    }
     assert shown(readable_predictions(judged)) == [
-        f"{label(ids[id])} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]}"
-        for id in ("A", "B")
+        f"{label(ids[id])} | {load_claims().by_id(ids[id]).prediction} | {SENTENCES[id]} | {text}"
+        for id, text in beside.items()
     ]
+    unknown = readable_predictions(judged.assign(consistent=""))
+    assert unknown["Beside the paper's"].tolist() == ["–", "–"]
+
+
+def test_an_effect_is_beside_the_papers_in_every_cell_or_in_some() -> None:
+    """What all cells have in common is said once; with two claims the place is named."""
+    cells = JUDGED[JUDGED["id"] == "A"].assign(consistent="no", predicted_high=2.0)
+    assert consistency(cells) == "larger under every reading"
+    assert consistency(cells.head(1)) == "larger"
+    two = cells.assign(id=["SAVES-OPEN", "SAVES-OBSTACLES"], consistent=["yes", "no"])
+    assert consistency(two) == (
+        "consistent with it under Fᵢ (open), and larger under Fᵢ₊₁ (obstacles)"
+    )
 
 
 def test_verdict_lines_have_the_claim_and_its_sentence() -> None:

@@ -15,6 +15,8 @@ SHARES = pd.DataFrame(
         ("FASTER", "TIES", 0.01),
         ("FASTER", "noise", 0.3),
         ("ZERO-OPEN", "TIES", 0.9),
+        ("AVOIDS-OPEN", "TIES", 0.1),
+        ("AVOIDS-OPEN", "noise", 0.6),
     ],
     columns=["claim", "choice", "share"],
 )
@@ -41,7 +43,7 @@ def test_choices_stand_by_kind() -> None:
 
 
 def test_what_matters_comes_first() -> None:
-    """The table has the choices with a large share, largest first, in words; noise is none."""
+    """The choices with a large share, largest first; none of a claim that chance decides."""
     table, _, rest = choices(SHARES).partition("\n\n")
     assert "| [Rate α of the trace](#choice-alpha) |" in re.sub(" +", " ", table)
     names = [line.split("|")[1].strip() for line in table.splitlines()[2:]]
