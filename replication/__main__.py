@@ -14,6 +14,12 @@ import sys
 from contextlib import suppress
 from typing import Any, NoReturn
 
+UNUSED = (
+    *("MPLBACKEND", "MATPLOTLIBRC", "SOURCE_DATE_EPOCH"),
+    *("NUMBA_DISABLE_JIT", "NUMBA_NUM_THREADS"),
+)
+"""Variables of libraries that no result depends on, and of which a wrong one ends them."""
+
 
 def main() -> None:
     """Run the command."""
@@ -28,7 +34,8 @@ def main() -> None:
     for stream in range(3):
         _open(stream)
     sys.stdout, sys.stderr = _stream(1, sys.stdout), _stream(2, sys.stderr)
-    os.environ.pop("MPLBACKEND", None)  # no figure needs one, and a wrong one ends Matplotlib
+    for name in UNUSED:
+        os.environ.pop(name, None)
     from replication.cli import app
 
     try:

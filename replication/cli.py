@@ -146,8 +146,12 @@ def _values(_: click.Context, __: click.Parameter, pairs: Sequence[tuple[str, st
         if name in values:
             raise UserError(f"-p {name} is given twice")
         try:
-            values[name] = json.loads(text, parse_constant=_no_constant)
+            values[name] = json.loads(
+                text, parse_constant=_no_constant, object_pairs_hook=_once(name)
+            )
             deep = _levels(values[name]) > LEVELS
+        except UserError:
+            raise
         except ValueError:
             values[name], deep = text, False
         except RecursionError:
@@ -161,6 +165,16 @@ def _levels(value: Any) -> int:
     """Return how deeply a JSON value is nested."""
     inner = value.values() if isinstance(value, dict) else value
     return 1 + max(map(_levels, inner), default=0) if isinstance(value, dict | list) else 0
+
+
+def _once(name: str) -> Callable[[list[tuple[str, Any]]], dict[str, Any]]:
+    def fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        try:
+            return files.fields(pairs)
+        except ValueError as error:
+            raise UserError(f"-p {name}: {error}") from None
+
+    return fields
 
 
 def _no_constant(text: str) -> NoReturn:
@@ -403,7 +417,7 @@ def status(profile: str, out: Path | None, all: bool) -> None:
 @number("--seed", 0, "Of the sample of trials; drawn anew by default.")
 @number("--timeout", 1, "Time that one cell may take.", default=3600, metavar="SECONDS")
 def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None:
-    """Prove the outputs of notebooks.
+    """Prove the outputs of notebooks, and of those that they need.
 
     Those of all notebooks by default. What should be there follows from the notebooks and
     environment.lock. Each notebook is executed again with its published trials, and must give the
@@ -414,6 +428,10 @@ def verify(notebooks: tuple[str, ...], jobs: int | None, **options: Any) -> None
 
     _catch_signals()
     files.check_writable(Path(tempfile.gettempdir()))
+    published = {path.resolve() for path in _all_notebooks()}
+    for path in map(_notebook, notebooks):
+        if path.resolve() not in published:
+            raise UserError(f"{path} publishes nothing here; name a notebook, such as open_maze")
     names = [_notebook(name).stem for name in notebooks]
     number = 0
     for line in _disagreements(names, jobs=jobs or joblib.cpu_count(), **options):
@@ -439,7 +457,10 @@ def _disagreements(
     from replication.pipeline.declaration import TRIALS
 
     every_run, target = _prepared(profile, out)
-    runs = [run for run in every_run if not names or run.name in names]
+    wanted = {run.name for run in every_run if not names or run.name in names}
+    for run in reversed(every_run):  # each stands behind what it needs
+        wanted.update(run.notebook.declared.needs if run.name in wanted else ())
+    runs = [run for run in every_run if run.name in wanted]
     _say("comparing the installed packages with environment.lock")
     yield from verify.verify_packages(files.PROJECT / "environment.lock")
     _say(f"comparing what is in {target.name} with what the notebooks declare")
@@ -521,7 +542,10 @@ def site(out: Path) -> None:
 
 @app.command(epilog="Example: replicate lab --out lab.html")
 @click.option(
-    "--out", type=FILE, metavar="FILE", help="Write the page to this file instead of opening it."
+    "--out",
+    type=FILE,
+    metavar="FILE",
+    help="Write the page to this file, and do not open it; by default build/lab.html is opened.",
 )
 def lab(out: Path | None) -> None:
     """Draw mazes and watch the methods learn, in the browser.
@@ -531,15 +555,14 @@ def lab(out: Path | None) -> None:
     from replication.lab.page import lab_page
 
     _catch_signals()
-    if out is not None:
-        _check_targets(out)
+    path = out or Path("build/lab.html")
+    _check_targets(path)
     figures = files.PROJECT / "figures"
     page = lab_page(figures if figures.is_dir() else None)
-    path = out or Path(tempfile.mkdtemp(prefix="maze-lab-")) / "lab.html"
     files.write_file(path, page)
     click.echo(f"open {path.resolve().as_uri()} in a browser")
     if out is None:
-        click.launch(path.as_uri())
+        click.launch(path.resolve().as_uri())
 
 
 @app.command(cls=InClone, epilog="Example: replicate export")
@@ -609,7 +632,9 @@ def learn(
     params = own_params(demos, **parameters)
     stem = out / f"{demos.task}-{method}"
     saved, picture = stem.with_suffix(".json"), stem.with_suffix(".png")
-    _check_targets(saved, picture, source=file)
+    environment = demos.environment
+    size = BYTES * environment.n_states * environment.n_actions
+    _check_targets(saved, picture, source=file, size=size)
     _say(f"{demos.task}, {method}: learning")
     with _plain_warnings(), iteration_meter() as report:
         result = fit(demos, method=method, params=params, seed=seed, report=report)
@@ -834,14 +859,21 @@ def _all_notebooks() -> list[Path]:
     return sorted((files.PROJECT / "notebooks").glob("*.ipynb"))
 
 
-def _check_targets(*targets: Path, source: Path | None = None) -> None:
-    """Refuse files that could not be written, or would take their source's place."""
+BYTES = 80
+"""Of a pair of state and action in a result, at most."""
+
+
+def _check_targets(*targets: Path, source: Path | None = None, size: int = 0) -> None:
+    """Refuse files that could not be written, or would take their source's place.
+
+    Room is asked for so many bytes beyond those of most results.
+    """
     for path in targets:
         if path.exists() and not path.is_file():
             raise UserError(f"{path} cannot be written: it is not a regular file; choose another")
         if source is not None and path.exists() and path.samefile(source):
             raise UserError(f"{path} would be overwritten; choose another --out")
-    files.check_writable(targets[0].parent)
+    files.check_writable(targets[0].parent, files.ROOM + size)
 
 
 def _short(path: Path) -> str:

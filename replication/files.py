@@ -1,4 +1,7 @@
-"""Files: the one door for reading, writing whole or not at all, and where the project is."""
+"""Files: the one door for reading, writing whole or not at all, and where the project is.
+
+One file because a door is only one if nothing else opens what a user may have put somewhere.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import re
 import shutil
 import stat
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -91,6 +95,20 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         raise FileError(path, f"is not JSON: {error}") from None
 
 
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return what a TOML file says.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, see :func:`read_text`, or is not TOML.
+    """
+    try:
+        return tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(path, f"is not TOML: {error}") from None
+
+
 def parse_json(content: str | bytes) -> Any:
     """Return what JSON text says, if it has one meaning and no more levels than anyone needs.
 
@@ -101,7 +119,7 @@ def parse_json(content: str | bytes) -> Any:
     """
     text = content if isinstance(content, str) else content.decode("utf-8-sig")
     with suppress(RecursionError):
-        value = json.loads(text, object_pairs_hook=_fields)
+        value = json.loads(text, object_pairs_hook=fields)
         inner = [value]
         for _ in range(DEEPEST):
             if not (inner := [item for outer in inner for item in _items(outer)]):
@@ -109,13 +127,14 @@ def parse_json(content: str | bytes) -> Any:
     raise ValueError(f"it is nested too deeply; {DEEPEST} levels are allowed")
 
 
-def _fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    fields: dict[str, Any] = {}
+def fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a JSON object; raises `ValueError` if one is there twice."""
+    found: dict[str, Any] = {}
     for name, value in pairs:
-        if name in fields:
+        if name in found:
             raise ValueError(f"the field {show(name)} appears twice in one object; keep one")
-        fields[name] = value
-    return fields
+        found[name] = value
+    return found
 
 
 def _items(value: Any) -> Iterator[Any]:
@@ -292,8 +311,8 @@ ROOM = 1_000_000
 """Bytes that :func:`check_writable` asks for: more than most results take."""
 
 
-def check_writable(folder: Path) -> None:
-    """Make a folder, and check that it can be written and that the disk has room.
+def check_writable(folder: Path, size: int = ROOM) -> None:
+    """Make a folder, and check that it can be written and that the disk has room for `size` bytes.
 
     It is called before anything is computed, so that no result is lost.
 
@@ -305,7 +324,7 @@ def check_writable(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as probe:  # is gone even if this is killed
-            probe.write(os.urandom(ROOM))
+            probe.write(os.urandom(size))
     except OSError as error:
         folder_missing = isinstance(error, FileExistsError | NotADirectoryError)
         why = "it is not a folder" if folder_missing else reason(error)

@@ -6,6 +6,7 @@ import os
 import re
 import resource
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -172,6 +173,8 @@ def test_run_refuses_in_one_line(project: Path) -> None:
     assert "'-p' requires 2 arguments" in refused("run", "-p", "trials")
     assert "-p takes two words" in refused("run", "-p", "trials=1", "toy")
     assert "-p trials is given twice" in refused("run", "-p", "trials", "1", "-p", "trials", "2")
+    twice = refused("run", "-p", "choices", '{"alpha": 0.1, "alpha": 0.9}')
+    assert "-p choices: the field 'alpha' appears twice in one object" in twice
     assert "use --out" in refused("run", "-p", "out", "x")
     figures = project / "figures"
     assert "profile 'paper'" in refused("run", "--profile", "quick", "--out", figures)
@@ -402,6 +405,29 @@ def test_verify_answers_by_its_exit_code(project: Path) -> None:
     assert result.stdout.endswith("3 things do not agree\n")
 
 
+def test_verify_takes_what_a_notebook_needs(project: Path) -> None:
+    """A notebook is as true as the results that it was made from."""
+    parameters = 'out = "x"\nresults = "x"'
+    code = "from pathlib import Path\n(Path(out) / 'a.md').write_text('| a |')"
+    more: dict[str, Any] = {"data": ["a.md"], "needs": ["toy"]}
+    write_notebook(project / "notebooks" / "all.ipynb", code, parameters=parameters, **more)
+    assert replicate("run", "toy", "all").exit_code == 0
+    assert "toy: made again" in replicate("verify", "all").stdout
+    assert "all: made again" not in replicate("verify", "toy").stdout
+    (project / "figures" / "toy" / "seen.md").write_text("mine")
+    assert "error: toy/seen.md is changed" in replicate("verify", "all").stderr
+
+
+def test_verify_refuses_what_is_not_published(project: Path) -> None:
+    """A copy of a notebook has published nothing, whatever its name."""
+    assert replicate("run").exit_code == 0
+    mine = project / "mine" / "toy.ipynb"
+    mine.parent.mkdir()
+    shutil.copy(project / "notebooks" / "toy.ipynb", mine)
+    assert f"{mine} publishes nothing here; name a notebook" in refused("verify", mine)
+    assert replicate("verify", project / "notebooks" / "toy.ipynb").exit_code == 0
+
+
 def test_an_edited_notebook_goes_elsewhere_and_says_so(project: Path) -> None:
     """What is published is replaced only if --publish is given; --check has nothing to compare."""
     assert replicate("run").exit_code == 0
@@ -497,13 +523,14 @@ def test_learn_takes_every_kind_of_task(tmp_path: Path) -> None:
 
 
 def test_the_lab_is_opened_or_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is opened from a file of its own, or written to one that is named; no clone is needed."""
+    """It is opened from one place, or written to one that is named; no clone is needed."""
     opened: list[str] = []
     monkeypatch.setattr("click.launch", opened.append)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(files, "PROJECT", tmp_path)
     assert replicate("lab").exit_code == 0
-    (page,) = tmp_path.glob("maze-lab-*/lab.html")
+    page = tmp_path / "build" / "lab.html"
+    assert [*tmp_path.iterdir()] == [page.parent]
     assert opened == [page.as_uri()]
     assert replicate("lab", "--out", tmp_path / "new" / "mine.html").exit_code == 0
     assert (tmp_path / "new" / "mine.html").read_bytes() == page.read_bytes()
@@ -537,6 +564,23 @@ def test_learn_computes_nothing_that_it_cannot_save(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert load_demos(own).task == "small"
+
+
+def test_learn_asks_for_the_room_that_its_result_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result of a large maze takes more than most; what is asked for is enough."""
+    side = 60
+    rows = ("S" + "." * (side - 2) + "G", *["." * side] * (side - 1))
+    demos = demonstrate("large", Maze(rows))
+    save_demos(demos, tmp_path / "large.json")
+    asked: list[int] = []
+    monkeypatch.setattr(files, "check_writable", lambda folder, size: asked.append(size))
+    words = ("--incorrect", "none", "-p", "max_iterations", "2", "-p", "episodes", "50")
+    assert replicate("learn", tmp_path / "large.json", *words, "--out", tmp_path).exit_code == 0
+    (size,) = asked
+    written = (tmp_path / "large-unified-incorrect.json").stat().st_size
+    assert files.ROOM < written + files.ROOM < size
 
 
 # --- demos and choices -----------------------------------------------------------------------

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from replication import Demos, save_demos
+from replication.__main__ import UNUSED
 from replication.files import PROJECT
 from tests.notebooks import write_notebook
 from tests.terminal import in_terminal, screen
@@ -107,6 +108,16 @@ def test_no_figure_needs_a_backend(project: Path) -> None:
     assert replicate(project, "run", env=bogus).returncode == 0
     done = replicate(project, "learn", "none.json", env=bogus)
     assert done.stderr == "error: none.json: cannot be read (no such file or directory)\n"
+
+
+@pytest.mark.parametrize("name", UNUSED)
+def test_what_libraries_are_told_does_not_matter(name: str, tmp_path: Path) -> None:
+    """A variable that would end Matplotlib or Numba, or hold it up, is none for the command."""
+    os.mkfifo(tmp_path / "pipe")
+    value = str(tmp_path / "pipe") if name == "MATPLOTLIBRC" else "bogus"
+    words = ["learn", "data/demos/open_maze.json", "-p", "max_iterations", "1"]
+    done = replicate(PROJECT, *words, "--out", str(tmp_path), env=os.environ | {name: value})
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_it_is_a_module_as_well() -> None:

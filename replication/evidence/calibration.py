@@ -28,7 +28,6 @@ from replication.evidence.statistics import (
     sd_prediction,
     summarise,
 )
-from replication.files import resolve
 from replication.irl.methods import TRACES
 from replication.paper.params import Params
 from replication.paper.published import TABLE_1, Published
@@ -74,7 +73,7 @@ def chosen(trace: str) -> Point:
 
 @cache
 def _demos(leg: int) -> Demos:
-    template = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    template = load_demos(EXPERIMENTS["open-maze"].demos)
     return demonstrate("open-maze", as_maze(template.environment), params=Expert(leg=leg))
 
 

@@ -24,7 +24,6 @@ from replication.evidence.experiments import EXPERIMENTS, GENERAL, NONE
 from replication.evidence.specifications import MAPS
 from replication.evidence.statistics import mean_interval
 from replication.evidence.variations import maze_demos
-from replication.files import resolve
 from replication.irl import METHODS, Method
 from replication.irl.methods import TRACES
 from replication.paper.params import Params
@@ -66,7 +65,7 @@ def conditions() -> dict[Setting, BaselineCondition]:
         for solver in SOLVERS:
             for condition in _each(demos, [*METHODS, *BASELINES], GENERAL, {"solver": solver}):
                 found[_setting(condition)] = condition
-    soccer = load_demos(resolve(EXPERIMENTS["soccer"].demos))
+    soccer = load_demos(EXPERIMENTS["soccer"].demos)
     for condition in _each(soccer, IN_SOCCER, "all", SOCCER):
         if condition.params.update.f_index == TRACES[0]:
             found[_setting(condition)] = condition

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pandas as pd
 from replication.demos.files import load_demos
 from replication.demos.model import Demos
 from replication.errors import unknown
-from replication.files import resolve
+from replication.files import stored
 from replication.irl import METHODS, get_method
 from replication.paper.params import Params
 from replication.paper.published import SOCCER
@@ -57,25 +58,21 @@ class Experiment:
     `sets` are the sets of incorrect demonstrations by which it is judged.
     """
 
-    demos: str
+    demos: Path
     choices: Mapping[str, Any]
     methods: tuple[str, ...]
     sets: tuple[str, ...]
 
     def conditions(self) -> dict[Key, Condition]:
         """Return the conditions that stand behind its figures and tables."""
-        demos = load_demos(resolve(self.demos))
+        demos = load_demos(self.demos)
         return conditions_of(demos, self.choices, self.methods, self.sets)
 
 
 EXPERIMENTS = {
-    "open-maze": Experiment("data/demos/open_maze.json", {}, tuple(METHODS), (NAMED, GENERAL)),
-    "obstacle-maze": Experiment(
-        "data/demos/obstacle_maze.json", {}, tuple(METHODS), (NAMED, GENERAL)
-    ),
-    "soccer": Experiment(
-        "data/demos/soccer.json", SOCCER, ("unified", "unified-incorrect"), ("all",)
-    ),
+    "open-maze": Experiment(stored("open_maze"), {}, tuple(METHODS), (NAMED, GENERAL)),
+    "obstacle-maze": Experiment(stored("obstacle_maze"), {}, tuple(METHODS), (NAMED, GENERAL)),
+    "soccer": Experiment(stored("soccer"), SOCCER, ("unified", "unified-incorrect"), ("all",)),
 }
 """By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension."""
 
@@ -134,7 +131,7 @@ def condition_of(task: str, method: str, reading: str, set: str) -> Condition:
         raise ChoiceError(unknown(task, EXPERIMENTS, "task"))
     experiment = EXPERIMENTS[task]
     params = _params(experiment.choices, reading, set)
-    condition = Condition(load_demos(resolve(experiment.demos)), method, params)
+    condition = Condition(load_demos(experiment.demos), method, params)
     if factors(condition) != {"task": task, "method": method, "reading": reading, "set": set}:
         raise ChoiceError(f"{task}: {method} has no reading {reading!r} with the set {set!r}")
     return condition

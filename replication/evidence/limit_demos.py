@@ -15,7 +15,6 @@ from replication.demos.maze_expert import Expert, random_actions
 from replication.demos.model import Demo, Demos
 from replication.envs.maze import Maze, as_maze
 from replication.evidence.experiments import EXPERIMENTS
-from replication.files import resolve
 from replication.irl.expectations import feature_expectations, mean_expectations, norm
 from replication.learning.seeds import child
 
@@ -97,7 +96,7 @@ def open_demos(side: int) -> Demos:
 
 @cache
 def _stored() -> Demos:
-    return load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    return load_demos(EXPERIMENTS["open-maze"].demos)
 
 
 def _seed(design: int, draw: int) -> np.random.SeedSequence:

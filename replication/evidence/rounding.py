@@ -24,7 +24,6 @@ from replication.demos.model import Demos
 from replication.envs.maze import as_maze
 from replication.evidence.experiments import EXPERIMENTS, NONE, conditions_of
 from replication.evidence.statistics import holm, mean_interval, sign_flip_p
-from replication.files import resolve
 from replication.irl import METHODS
 from replication.learning.seeds import child
 from replication.paper.register import Value, load_choices
@@ -81,7 +80,7 @@ def conditions() -> dict[tuple[Setting, Value, Value], Condition]:
 
 @cache
 def _demos(task: str) -> Demos:
-    stored = load_demos(resolve(EXPERIMENTS[task].demos))
+    stored = load_demos(EXPERIMENTS[task].demos)
     return demonstrate(task, as_maze(stored.environment), params=Expert(leg=LEG))
 
 

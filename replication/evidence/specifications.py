@@ -20,7 +20,7 @@ from replication.demos.checks import DemoError
 from replication.demos.files import load_demos
 from replication.evidence.claims import ClaimError, Strict, load_claims
 from replication.evidence.experiments import EXPERIMENTS
-from replication.files import read_text, resolve
+from replication.files import read_text
 from replication.paper.register import ChoiceError, Value, load_choices
 
 FILE = Path(__file__).with_name("specifications.toml")
@@ -144,7 +144,7 @@ def check_declared() -> None:
         ("mazes.factorial", plan.mazes.factorial.choices, "open-maze"),
         ("soccer.single", plan.soccer.single.choices, "soccer"),
     ):
-        demos = load_demos(resolve(EXPERIMENTS[task].demos))
+        demos = load_demos(EXPERIMENTS[task].demos)
         for kinds in table.get("INCORRECT-KINDS", ()):
             try:
                 demos.select(str(kinds))

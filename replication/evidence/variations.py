@@ -23,7 +23,6 @@ from replication.evidence.experiments import (
     rule_conditions,
 )
 from replication.evidence.specifications import RANDOM, Ablations, Specification, default_of
-from replication.files import resolve
 from replication.irl import READINGS
 from replication.irl.expectations import visited
 from replication.paper.register import Value, load_choices
@@ -56,7 +55,7 @@ def soccer_conditions(specification: Specification, cap: int) -> dict[Key, Condi
     """Return the conditions of both methods in robot soccer, in a new world if that changes."""
     choices = dict(specification.choices)
     experiment = EXPERIMENTS["soccer"]
-    demos = load_demos(resolve(experiment.demos))
+    demos = load_demos(experiment.demos)
     assert isinstance(demos.environment, SoccerField)
     if "SOCCER-EPISODES" in choices:
         choices["EPISODES"] = choices.pop("SOCCER-EPISODES")
@@ -109,11 +108,9 @@ def _world(world: str) -> tuple[str, Maze]:
     """Return the name of a maze's task, and the maze."""
     stored = {"open": "open-maze", "obstacles": "obstacle-maze"}
     if world in stored:
-        return stored[world], as_maze(
-            load_demos(resolve(EXPERIMENTS[stored[world]].demos)).environment
-        )
+        return stored[world], as_maze(load_demos(EXPERIMENTS[stored[world]].demos).environment)
     task = f"{world}-maze"
-    template = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    template = load_demos(EXPERIMENTS["open-maze"].demos)
     shapes = load_choices()["DEMO-SHAPE"]
     experts = [Expert(leg=int(leg)) for leg in (shapes.default, *shapes.alternatives)]
     experts.append(Expert(path="random-1"))
@@ -158,7 +155,7 @@ def random_mazes(
 
 def ablation_conditions(ablations: Ablations, cap: int) -> dict[Ablation, Condition]:
     """Return the ablations of the trace, the default first, and the readings of AdaBoost-IRL."""
-    demos = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    demos = load_demos(EXPERIMENTS["open-maze"].demos)
     rules = rule_conditions(demos, {"max_iterations": cap})
     return trace_conditions(ablations, cap) | {
         (condition.method, "", f"ADABOOST-RULE={rule}"): condition

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -57,7 +56,7 @@ def about() -> About:
     ExportError
         If nothing says when the results were published.
     """
-    project = tomllib.loads(read_text(files.PROJECT / "pyproject.toml"))["project"]
+    project = files.read_toml(files.PROJECT / "pyproject.toml")["project"]
     cff = yaml.safe_load(read_text(files.PROJECT / "CITATION.cff"))
     return About(project, cff, str(cff.get("date-released") or committed()))
 

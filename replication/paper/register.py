@@ -8,13 +8,13 @@ allow, and the registered words; `Choice.registered` takes only what is compared
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from replication.errors import UserError
+from replication.files import read_toml
 
 Value = str | int | float
 
@@ -85,9 +85,8 @@ def load_choices() -> dict[str, Choice]:
     ChoiceError
         If an entry has an unknown key, or an id occurs twice.
     """
-    text = resources.files("replication.paper").joinpath("choices.toml").read_text(encoding="utf-8")
     entries: dict[str, Choice] = {}
-    for entry in tomllib.loads(text)["choice"]:
+    for entry in read_toml(Path(__file__).with_name("choices.toml"))["choice"]:
         lists = {key: tuple(entry[key]) for key in ("alternatives", "range") if key in entry}
         try:
             registered = Choice(**{**entry, **lists})

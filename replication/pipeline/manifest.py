@@ -187,7 +187,7 @@ def _git(*words: str) -> str | None:
 
 def _is_run(entry: Any) -> bool:
     try:
-        float(entry["seconds"])
+        entry["seconds"] + 0.0
         return datetime.datetime.fromisoformat(entry["finished"]).tzinfo is not None
     except (KeyError, TypeError, ValueError):
         return False

@@ -9,9 +9,11 @@ from typing import Any
 
 import joblib
 
+from replication import files
 from replication.errors import unknown
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.inputs import NEUTRAL, Inputs, changes, inputs_of
-from replication.pipeline.manifest import State, read_manifest, state_of
+from replication.pipeline.manifest import State, published_folders, read_manifest, state_of
 from replication.pipeline.notebook import Notebook, NotebookError, read_notebook, refuse
 
 
@@ -44,10 +46,16 @@ class Run:
 
     @property
     def edits(self) -> list[str]:
-        """What is not as it was for what is published, but for the outputs of other notebooks."""
+        """What is not as it was for what is published, but for the outputs of other notebooks.
+
+        Where other folders are published and this one's manifest cannot be read, nobody knows.
+        """
         manifest = read_manifest(self.folder)
+        if not manifest:
+            lost = f"its {MANIFEST} is missing or damaged"
+            return [lost] if published_folders(self.out) else []
         theirs = tuple(f"{need}/" for need in self.notebook.declared.needs)
-        found = changes(manifest["inputs"], self.inputs) if manifest else []
+        found = changes(manifest["inputs"], self.inputs)
         return [change for change in found if not change.startswith(theirs)]
 
     def again(self) -> Run:
@@ -108,6 +116,24 @@ def prepare(
         notebook.check(values)
         runs.append(Run(notebook, values, inputs_of(notebook, values, out), out))
     return runs
+
+
+def foreign(notebooks: Sequence[Path]) -> str:
+    """Say which of some notebooks is not one of the project's own, if any."""
+    own = (files.PROJECT / "notebooks").resolve()
+    others = [path for path in notebooks if path.resolve().parent != own]
+    return f"{others[0]} is not in notebooks/" if others else ""
+
+
+def check_unedited(runs: Sequence[Run]) -> None:
+    """Refuse to replace published results by others than a notebook gave then."""
+    for run in runs:
+        if edits := run.edits:
+            more = f" and {len(edits) - 1} more" if len(edits) > 1 else ""
+            raise NotebookError(
+                f"{run.folder} keeps what was published, as {edits[0]}{more} since then; "
+                "--publish replaces it"
+            )
 
 
 def _ordered(notebooks: Sequence[Notebook], out: Path) -> list[Notebook]:

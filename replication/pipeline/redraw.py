@@ -96,7 +96,9 @@ def _redraw_folder(
 
 
 def _check_whole(folder: Path, manifest: Mapping[str, Any], file: str) -> None:
-    if how := damaged(folder, manifest, (file,)).get(file):
+    how = damaged(folder, manifest, (file,)).get(file)
+    how = how or ("" if file in manifest["outputs"] else "not in the manifest")
+    if how:
         message = f"is {how} since its run; first: replicate run {folder.name}"
         raise NotebookError(f"{folder / file}: {message}")
 

@@ -32,7 +32,14 @@ from replication.pipeline.folders import (
 from replication.pipeline.index import write_index
 from replication.pipeline.manifest import FRESH, read_runs, record_run
 from replication.pipeline.notebook import NotebookError, RunError, first_line
-from replication.pipeline.plan import Run, departures, prepare, run_name
+from replication.pipeline.plan import (
+    Run,
+    check_unedited,
+    departures,
+    foreign,
+    prepare,
+    run_name,
+)
 from replication.pipeline.produce import produce, store_of, unpublished
 from replication.pipeline.publish import check_target, differing, draft_folder, swap
 from replication.progress import SCHEDULER, Display
@@ -59,12 +66,15 @@ def destination(
     What is published in `figures` is replaced only if nothing that it depends on was edited, or if
     `publish` says so.
     """
-    out = outputs_folder(run_name(profile, seed=asked["seed"], parameters=asked["parameters"]))
+    name = run_name(profile, seed=asked["seed"], parameters=asked["parameters"])
+    if why := foreign(notebooks):
+        return outputs_folder("custom" if name == "paper" else name), why
+    out = outputs_folder(name)
     if publish or not is_published(out):
         return out, ""
     runs = prepare(notebooks, profile=profile, out=out, **asked)
     try:
-        _check_unedited(runs)
+        check_unedited(runs)
     except NotebookError as error:
         return files.PROJECT / EDITED, str(error)
     return out, ""
@@ -123,6 +133,8 @@ def run_notebooks(
         If a cell failed, took too long or killed its kernel, or if its outputs are not the
         declared ones or cannot be written.
     """
+    if is_published(out) and (why := foreign(notebooks)):
+        raise NotebookError(f"{why}, so nothing of it is published in {out}; choose another")
     other = [] if profile == "paper" else [f"--profile {profile}"]
     other += departures(asked.get("seed"), asked.get("parameters"))
     if other and is_published(out):
@@ -134,7 +146,7 @@ def run_notebooks(
     def prepared() -> list[Run]:
         runs = prepare(notebooks, profile=profile, out=out, **asked)
         if is_published(out) and not publish:
-            _check_unedited(runs)
+            check_unedited(runs)
         return runs
 
     runs = prepared()
@@ -190,17 +202,6 @@ def _check(runs: Sequence[Run], checks: Mapping[str, Callable[[], object]], sche
     except (OSError, ValueError) as error:
         message = f"no Dask scheduler answers at {address}: {first_line(error)}"
         raise NotebookError(message) from None
-
-
-def _check_unedited(runs: Sequence[Run]) -> None:
-    """Refuse to replace published results by others than a notebook gave then."""
-    for run in runs:
-        if edits := run.edits:
-            more = f" and {len(edits) - 1} more" if len(edits) > 1 else ""
-            raise NotebookError(
-                f"{run.folder} keeps what was published, as {edits[0]}{more} since then; "
-                "--publish replaces it"
-            )
 
 
 def _run_one(run: Run, *, force: bool, echo: Echo, **options: Any) -> Published:

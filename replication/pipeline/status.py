@@ -9,6 +9,7 @@ from pathlib import Path
 
 from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.folders import exclusive, is_published
+from replication.pipeline.index import write_index
 from replication.pipeline.manifest import (
     FRESH,
     MISSING,
@@ -118,6 +119,8 @@ def clean(runs: Sequence[Run], out: Path, *, dry_run: bool, echo: Callable[[str]
                 echo(f"{'would remove' if dry_run else 'removed'} {name}/{file}")
             if not dry_run and not any((out / name).iterdir()):
                 (out / name).rmdir()
+        if not dry_run:
+            write_index(out)
 
 
 def _command(*words: str) -> str:

@@ -22,7 +22,7 @@ from replication.demos.files import load_demos, save_demos
 from replication.demos.model import Demos
 from replication.envs.environment import Environment
 from replication.errors import UserError
-from replication.files import check_writable
+from replication.files import check_writable, read_file
 from replication.recording.keys import split_keys
 from replication.recording.recorder import Recorder
 from replication.recording.worlds import as_world
@@ -69,14 +69,20 @@ def record(
     world = as_world(environment)
     if path is not None:
         check_writable(Path(path).absolute().parent)
-    present = None
+    present = known = None
     if path is not None and Path(path).exists():
+        known = read_file(path)
         present = load_demos(path, task=world.environment)
     name = present.task if present else task or _task_name(path)
 
     def save(demos: Demos) -> None:
-        if path is not None:
-            save_demos(demos, path)
+        nonlocal known
+        if path is None:
+            return
+        if Path(path).exists() and read_file(path) != known:
+            raise UserError(f"{path} was changed elsewhere; move it away, and keep this again")
+        save_demos(demos, path)
+        known = read_file(path)
 
     recorder = Recorder(world, name, present, save)
     try:

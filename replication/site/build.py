@@ -9,14 +9,13 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from replication import files
 from replication.errors import UserError
 from replication.evidence.tables import read_table
-from replication.files import read_file, read_text, write_file
+from replication.files import read_file, read_text, read_toml, write_file
 from replication.lab.page import lab_part
 from replication.pipeline.declaration import EXECUTED
 from replication.pipeline.folders import exclusive, outputs_folder
@@ -135,7 +134,7 @@ def _sources(runs: Sequence[Run], out: Path) -> Iterator[tuple[str, bytes]]:
             yield f"{name}.xz", lzma.compress(read_file(path), preset=9 | lzma.PRESET_EXTREME)
         elif path.suffix != ".ipynb":
             yield name, read_file(path)
-    captions = tomllib.loads(read_text(docs / "captions.toml"))
+    captions = read_toml(docs / "captions.toml")
     for run in runs:
         parameters = {**run.notebook.literals, **run.values}
         origin = Origin(run.name, parameters, captions.get(run.name, {}))

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replication.errors import UserError
-from replication.files import open_lock, printable
+from replication.files import open_lock, printable, reason
 from replication.irl import Snapshots, Trial
 from replication.irl.agent import Episode
 
@@ -57,7 +57,7 @@ class Store:
     ----------
     path
         The SQLite file; it and its folder are made when missing. A damaged file is set aside, with
-        a message, and a new one begun.
+        a message, and a new one begun; what never was a store, and is not called so, stays.
 
     Raises
     ------
@@ -69,10 +69,14 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        with suppress(FileNotFoundError):  # one look: another process may set it aside meanwhile
-            if not stat.S_ISREG(self.path.stat().st_mode):
-                message = f"{printable(path)}: the store cannot be used: it is no regular file"
-                raise UserError(message)
+        for suffix in ("", "-journal", "-wal", "-shm"):
+            file = self.path.with_name(self.path.name + suffix)
+            with suppress(
+                FileNotFoundError
+            ):  # one look: another process may set it aside meanwhile
+                if not stat.S_ISREG(file.stat().st_mode):
+                    message = f"{printable(file)}: the store cannot be used: it is no regular file"
+                    raise UserError(message)
         self.path.parent.mkdir(parents=True, exist_ok=True)
         # SQLite does not wait for whoever is making the file, and a damaged one is set aside once
         with open_lock(self.path.with_name(f"{self.path.name}-lock")) as lock:
@@ -86,6 +90,9 @@ class Store:
                 code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
                 if isinstance(error, sqlite3.OperationalError) and code != sqlite3.SQLITE_ERROR:
                     message = f"{printable(path)}: the store cannot be used: {error}"
+                    raise UserError(message) from None
+                if code == sqlite3.SQLITE_NOTADB and self.path.suffix != ".sqlite":
+                    message = f"{printable(path)} is no store of trials; give another file"
                     raise UserError(message) from None
                 self._set_aside(str(error))
                 self._open()
@@ -143,9 +150,13 @@ class Store:
 
     def _set_aside(self, why: str) -> None:
         self._connection.close()
-        aside = self.path.replace(self.path.with_name(f"{self.path.name}.damaged"))
-        for suffix in ("-wal", "-shm"):
-            self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
+        try:
+            aside = self.path.replace(self.path.with_name(f"{self.path.name}.damaged"))
+            for suffix in ("-wal", "-shm"):
+                self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
+        except OSError as error:
+            message = f"{printable(self.path)} is damaged and cannot be set aside: {reason(error)}"
+            raise UserError(message) from None
         print(
             f"{self.path} is damaged ({why}): set aside as {aside.name}; its trials are computed "
             "again",

@@ -116,7 +116,7 @@ def test_draws_are_of_the_declared_root() -> None:
 def test_without_slips_it_is_the_plain_demonstration() -> None:
     """At level 0 each draw is the stored path."""
     stored = limit_demos._stored().correct[0].actions.tolist()
-    assert EXPERIMENTS["open-maze"].demos.endswith("open_maze.json")
+    assert EXPERIMENTS["open-maze"].demos.name == "open_maze.json"
     assert [noisy_demos(0.0, draw).correct[0].actions.tolist() for draw in (0, 7)] == [stored] * 2
 
 

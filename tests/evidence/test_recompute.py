@@ -41,7 +41,7 @@ def table(tmp_path: Path, small_demos: Demos, monkeypatch: pytest.MonkeyPatch) -
     """Return the trials.csv of a small task, with its store beside it."""
     save_demos(small_demos, tmp_path / "small.json")
     methods = ("adaboost", "unified", "unified-incorrect")
-    experiment = Experiment(str(tmp_path / "small.json"), FEW, methods, ("hit+detour",))
+    experiment = Experiment(tmp_path / "small.json", FEW, methods, ("hit+detour",))
     monkeypatch.setitem(EXPERIMENTS, "small", experiment)
     groups = [Group(list(experiment.conditions().values()), 2)]
     store = Store(tmp_path / "s.sqlite")

@@ -30,7 +30,7 @@ from replication.evidence.variations import (
     soccer_conditions,
     trace_conditions,
 )
-from replication.files import PROJECT, resolve
+from replication.files import PROJECT
 from replication.irl import READINGS, get_method
 from replication.irl.methods import TRACES
 from replication.paper.register import load_choices
@@ -196,7 +196,7 @@ def test_factorial_specification_sets_all_its_choices() -> None:
 @pytest.fixture(scope="module")
 def template() -> Maze:
     """Return the open maze."""
-    return as_maze(load_demos(resolve(EXPERIMENTS["open-maze"].demos)).environment)
+    return as_maze(load_demos(EXPERIMENTS["open-maze"].demos).environment)
 
 
 def test_random_mazes_are_as_declared(template: Maze) -> None:
@@ -229,7 +229,7 @@ def test_random_map_lets_the_expert_show_everything(template: Maze) -> None:
     """In a declared random maze each kind of mistake can be driven, and the task has its name."""
     one = Specification("single", (("MAP", "random-1"), ("INCORRECT-KINDS", "all")))
     demos = maze_conditions(one, CAP)["unified-incorrect", "printed", "all"].selected
-    stored = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    stored = load_demos(EXPERIMENTS["open-maze"].demos)
     assert set(demos.kinds) == set(stored.kinds)
     assert (demos.task, len(demos.correct[0].actions)) == ("random-1-maze", MOVES)
     assert (~as_maze(demos.environment).free).sum() == OBSTACLES
@@ -373,7 +373,7 @@ def test_numbered_settings_differ_in_demonstrations_alone(
     numbered: Numbered,
 ) -> None:
     """Without incorrect demonstrations it is the method that uses none; the cap reaches all."""
-    stored = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    stored = load_demos(EXPERIMENTS["open-maze"].demos)
     for number in {number for number, _ in numbered}:
         readings = [f for n, f in numbered if n == number]
         assert readings == list(READINGS if number else TRACES)

@@ -5,7 +5,6 @@ import inspect
 import math
 import pydoc
 from collections.abc import Collection
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from replication.envs.soccer.rules import SoccerParams
 from replication.files import PROJECT
 from replication.irl import READINGS
 from replication.learning import reference
-from replication.paper import params
+from replication.paper import params, register
 from replication.paper.register import Choice, ChoiceError, Chosen, load_choices
 from replication.trials.measures import Report
 
@@ -162,6 +161,6 @@ def test_register_with_a_slip_is_refused(
     rest = '\nplace = "p"\nopen = "o"\ndefault = 1\nrule = "r"\n'
     text = f'[[choice]]\nid = "A"{rest}[[choice]]\n{more}{rest}'
     (tmp_path / "choices.toml").write_text(text)
-    monkeypatch.setattr(resources, "files", lambda package: tmp_path)
+    monkeypatch.setattr(register, "__file__", str(tmp_path / "register.py"))
     with pytest.raises(ChoiceError, match=message):
         load_choices.__wrapped__()

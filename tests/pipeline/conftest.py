@@ -33,7 +33,7 @@ def write(project: Path) -> Write:
     """Write a notebook: a headline, the parameters cell, PRELUDE and more code cells."""
 
     def write(*code: str, name: str = "toy", **given: Any) -> Path:
-        path = project / f"{name}.ipynb"
+        path = project / "notebooks" / f"{name}.ipynb"
         given = {"parameters": PARAMETERS, "prose": "# Toy"} | given
         write_notebook(path, PRELUDE, *code, **given)
         return path

@@ -156,7 +156,11 @@ def test_versions_are_named_in_neutral_words() -> None:
 
 
 @pytest.mark.parametrize(
-    "entry", ["3", "{}", '{"seconds": 1}', '{"seconds": "x", "finished": "y"}']
+    "entry",
+    [
+        *("3", "{}", '{"seconds": 1}', '{"seconds": "x", "finished": "y"}'),
+        '{"seconds": "5", "finished": "2026-01-01T00:00:00+00:00"}',
+    ],
 )
 def test_a_record_that_cannot_be_used_counts_as_none(tmp_path: Path, entry: str) -> None:
     """A run that lacks what is shown is not known, and the others are."""

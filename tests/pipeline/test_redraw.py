@@ -109,6 +109,17 @@ def test_what_was_edited_is_not_drawn(out: Path, redrawn: Redraw, file: str) -> 
     assert content(out) == before
 
 
+def test_a_notebook_that_the_manifest_does_not_name_is_not_read(out: Path, redrawn: Redraw) -> None:
+    """What no run has written may hold anything."""
+    path = out / "na" / "provenance.json"
+    manifest = json.loads(path.read_text())
+    del manifest["outputs"]["notebook.ipynb"]
+    path.write_text(json.dumps(manifest))
+    (out / "na" / "notebook.ipynb").write_text("{}")
+    with pytest.raises(NotebookError, match=r"notebook\.ipynb: is not in the manifest since"):
+        redrawn("a", style="new")
+
+
 def test_a_figure_that_cannot_be_drawn_is_named(out: Path) -> None:
     """Whatever the drawing code raises is one line, and nothing is changed."""
     before = content(out)

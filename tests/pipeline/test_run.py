@@ -21,6 +21,7 @@ from replication import source
 from replication.errors import UserError
 from replication.files import scratch_folder, write_file
 from replication.pipeline import publish
+from replication.pipeline.declaration import MANIFEST
 from replication.pipeline.manifest import RUNS
 from replication.pipeline.notebook import NotebookError, RunError
 from replication.pipeline.run import Published, destination, run_notebooks
@@ -149,6 +150,47 @@ def test_an_edit_never_replaces_what_is_published(
     assert begun == ["toy"] * 3
     run(path, publish=False)
     assert destination([path], profile="paper", publish=False, **asked)[1] == ""
+
+
+@pytest.mark.parametrize("lost", ["manifest", "damaged", "folder"])
+def test_without_a_manifest_nobody_knows_what_was_edited(
+    toy: Any, write: Any, run: Any, project: Path, begun: list[str], lost: str
+) -> None:
+    """Beside other published folders, one whose manifest cannot be read is not replaced."""
+    path, folder = toy(), project / "figures" / "toy"
+    asked: dict[str, Any] = {"seed": None, "parameters": None}
+    assert destination([path], profile="paper", publish=False, **asked)[1] == ""
+    run(path, write(name="other"))
+    toy(parameters=STORED.replace("seed = 1", "seed = 2"))
+    if lost == "folder":
+        shutil.rmtree(folder)
+    elif lost == "manifest":
+        (folder / MANIFEST).unlink()
+    else:
+        (folder / MANIFEST).write_text("<<<<<<< HEAD\n" + (folder / MANIFEST).read_text())
+    with pytest.raises(NotebookError, match=rf"as its {MANIFEST} is missing or damaged since then"):
+        run(path, publish=False)
+    assert begun == ["toy", "other"]
+    target, why = destination([path], profile="paper", publish=False, **asked)
+    assert target == project / "build" / "edited"
+    assert MANIFEST in why
+
+
+def test_a_notebook_of_ones_own_goes_elsewhere(
+    toy: Any, run: Any, project: Path, begun: list[str]
+) -> None:
+    """What is not in the project's folder of notebooks is not published among its results."""
+    mine = toy().rename(project / "mine.ipynb")
+    with pytest.raises(NotebookError, match=r"mine\.ipynb is not in notebooks/, so nothing of it"):
+        run(mine)
+    assert begun == []
+    for profile, folder in (("paper", "custom"), ("quick", "quick")):
+        options: dict[str, Any] = {"profile": profile, "publish": True}
+        target, why = destination([mine], seed=None, parameters=None, **options)
+        assert target == project / "build" / folder
+        assert "is not in notebooks/" in why
+    run(mine, out=project / "build" / "custom")
+    assert begun == ["mine"]
 
 
 def test_damage_is_mended_without_being_told_to(toy: Any, run: Any, project: Path) -> None:

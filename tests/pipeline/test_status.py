@@ -13,6 +13,7 @@ import pytest
 from replication import files
 from replication.pipeline import status
 from replication.pipeline.declaration import MANIFEST
+from replication.pipeline.index import INDEX
 from replication.pipeline.notebook import NotebookError
 from replication.pipeline.plan import Run, prepare
 from replication.pipeline.run import run_notebooks
@@ -30,19 +31,19 @@ def write(project: Path, name: str = "maze", code: str = "x = 1", prose: str = "
     """Write a notebook with a figure, a table and a file of data."""
     declared = {"figures": ["fig"], "tables": ["table"], "data": ["trials.csv"]}
     given: dict[str, Any] = {"parameters": 'trials = 3\nout = "x"', "prose": prose} | declared
-    write_notebook(project / f"{name}.ipynb", code, **given)
-    return project / f"{name}.ipynb"
+    write_notebook(project / "notebooks" / f"{name}.ipynb", code, **given)
+    return project / "notebooks" / f"{name}.ipynb"
 
 
 def run(project: Path, *names: str) -> None:
-    """Run notebooks into `figures`."""
-    notebooks = [project / f"{name}.ipynb" for name in names]
-    run_notebooks(notebooks, profile="paper", out=project / "figures")
+    """Run notebooks into `figures`, whatever is there."""
+    notebooks = [project / "notebooks" / f"{name}.ipynb" for name in names]
+    run_notebooks(notebooks, profile="paper", out=project / "figures", publish=True)
 
 
 def prepared(project: Path, *names: str) -> list[Run]:
     """Return the runs of notebooks as they are now."""
-    paths = [project / f"{name}.ipynb" for name in names]
+    paths = [project / "notebooks" / f"{name}.ipynb" for name in names]
     return prepare(paths, profile="paper", out=project / "figures")
 
 
@@ -209,7 +210,7 @@ def left(project: Path) -> Path:
     write(project)
     write(project, "old")
     run(project, "maze", "old")
-    (project / "old.ipynb").unlink()
+    (project / "notebooks" / "old.ipynb").unlink()
     (project / "figures" / "maze" / "surplus.png").touch()
     return project / "figures"
 
@@ -225,6 +226,8 @@ def test_what_no_notebook_declares_goes(project: Path, left: Path) -> None:
     assert cleaned(project) == [f"removed {word}" for word in words]
     assert names(left) == before - {"maze/surplus.png", *surplus}
     assert not (left / "old").exists()
+    assert "[maze]" in (left / INDEX).read_text()
+    assert "[old]" not in (left / INDEX).read_text()
     assert cleaned(project) == []
     assert lines(project)[-1].startswith("everything is fresh")
 

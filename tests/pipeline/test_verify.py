@@ -36,7 +36,7 @@ def out(write: Write, project: Path) -> Path:
 
 def planned(out: Path) -> Run:
     """Return the notebook's run as it is now."""
-    (run,) = prepare([out.parent / "toy.ipynb"], profile="paper", out=out)
+    (run,) = prepare([out.parent / "notebooks" / "toy.ipynb"], profile="paper", out=out)
     return run
 
 

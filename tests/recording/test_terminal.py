@@ -64,6 +64,20 @@ def test_a_session(folder: Path) -> None:
     assert kinds == ["hit", "bump"]
 
 
+def test_two_who_record_in_one_file_lose_nothing(folder: Path) -> None:
+    """What another has added meanwhile stays; once it is moved away, one's own can be kept."""
+    one, other = typist(folder), typist(folder)
+    one.press(WAY + "\r\r", "mine: 1 correct")
+    other.press(WAY + "\r\r", "was changed elsewhere; move it away")
+    (folder / FILE).rename(folder / "first.json")
+    other.press("\r", "mine: 1 correct")
+    assert len(load_demos(folder / FILE).correct) == 1
+    assert len(load_demos(folder / "first.json").correct) == 1
+    for at in (one, other):
+        at.press("q", "demos: mine.json")
+        assert at.end() == 0
+
+
 def test_what_is_unusual_is_told_in_the_end(folder: Path) -> None:
     """A mistake that shows nothing wrong is saved, with the warning that `demos check` gives."""
     at = typist(folder)

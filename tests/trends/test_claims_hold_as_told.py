@@ -17,7 +17,7 @@ from replication.evidence.rounding import chosen_tolerance
 from replication.evidence.specifications import named_choices
 from replication.evidence.tables import read_table
 from replication.evidence.verdicts import ABSENT, REVERSED, SHOWN
-from replication.files import PROJECT, resolve
+from replication.files import PROJECT
 from replication.paper.register import load_choices
 from replication.report.maze import places
 
@@ -128,7 +128,7 @@ def test_the_reward_grows_with_time() -> None:
     assert judged("Q-GROWS")["verdict"].tolist() == [REVERSED, SHOWN]
     surface = read("open_maze/fig07")
     end = surface[surface["surface"] == "q_end"].set_index(["x", "y"])["value"]
-    demos = load_demos(resolve(EXPERIMENTS["open-maze"].demos))
+    demos = load_demos(EXPERIMENTS["open-maze"].demos)
     path = places(as_maze(demos.environment), demos.correct[0].states[:-1])
     values = [end[place] for place in zip(*path, strict=True)]
     assert spearmanr(np.arange(len(values)), values).statistic < -0.8

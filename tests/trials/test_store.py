@@ -313,6 +313,32 @@ def test_a_store_that_cannot_be_used_is_an_error(store_path: Path, what: str) ->
     assert list(store_path.parent.iterdir()) == [store_path]
 
 
+def test_a_file_of_another_kind_stays(tmp_path: Path) -> None:
+    """What is no database, and is not called one, is somebody's own."""
+    notes = tmp_path / "notes.txt"
+    notes.write_text("my notes, which are longer than a header of SQLite is, that is 100 bytes" * 2)
+    before = notes.read_bytes()
+    with pytest.raises(UserError, match=r"notes\.txt is no store of trials; give another file"):
+        Store(notes)
+    assert notes.read_bytes() == before
+    assert not [*tmp_path.glob("*.damaged")]
+
+
+def test_neighbours_of_a_store_are_looked_at(store_path: Path) -> None:
+    """A pipe where SQLite keeps its journal would block it; a folder lets nothing be set aside."""
+    store_path.parent.mkdir()
+    for suffix in ("-journal", "-wal", "-shm"):
+        pipe = store_path.with_name(store_path.name + suffix)
+        os.mkfifo(pipe)
+        with pytest.raises(UserError, match=f"{pipe.name}: the store cannot be used"):
+            Store(store_path)
+        pipe.unlink()
+    store_path.write_bytes(b"no database, but as long as its header" * 9)
+    (store_path.with_name("trials.sqlite.damaged") / "mine").mkdir(parents=True)
+    with pytest.raises(UserError, match="is damaged and cannot be set aside: is a directory"):
+        Store(store_path)
+
+
 @pytest.mark.parametrize("content", [None, b"no database, but as long as its header" * 9])
 def test_many_may_open_a_new_store_at_once(tmp_path: Path, content: bytes | None) -> None:
     """Threads and processes that open it at one instant all do, and lose nothing of each other."""
