@@ -19,12 +19,12 @@ PACKAGE = FOLDER.name
 SILENT = frozenset(
     f"{PACKAGE}.{name}"
     for name in (
-        *("demos.checks", "errors", "irl.methods", "source", "trials.agents"),
+        *("demos.checks", "errors", "files", "irl.methods", "source", "trials.agents"),
         *("paper.params", "paper.register"),  # the values of parameters are part of the key
         *("envs.tasks.base", "envs.tasks.moves"),  # of tasks whose trials are not stored
     )
 )
-"""Modules that change no stored trial: they check, phrase messages, list what there is, or hash."""
+"""Modules that change no stored trial: they check, read, phrase messages, list, or hash."""
 
 
 @cache

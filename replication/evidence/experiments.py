@@ -74,7 +74,10 @@ EXPERIMENTS = {
     "obstacle-maze": Experiment(stored("obstacle_maze"), {}, tuple(METHODS), (NAMED, GENERAL)),
     "soccer": Experiment(stored("soccer"), SOCCER, ("unified", "unified-incorrect"), ("all",)),
 }
-"""By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension."""
+"""By task. The paper has no AdaBoost-IRL in the maze with obstacles: there it is an extension.
+
+:meta hide-value:
+"""
 
 
 def conditions_of(
