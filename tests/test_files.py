@@ -26,6 +26,7 @@ from replication.files import (
     read_file,
     read_json,
     read_text,
+    read_toml,
     scratch_folder,
     shown_as,
     stored,
@@ -75,6 +76,17 @@ def test_text_is_utf_8(tmp_path: Path) -> None:
     assert read_text(write_file(tmp_path / "file", "a\r\nä")) == "a\r\nä"
     with pytest.raises(FileError, match=r"file: is not UTF-8 text \(byte 2\); save it as UTF-8"):
         read_text(write_file(tmp_path / "file", b"a\xff"))
+
+
+def test_toml_is_one_door_further(tmp_path: Path, spoil: Spoil) -> None:
+    """It is read as other text is; what is no TOML has its line named."""
+    assert read_toml(write_file(tmp_path / "a.toml", "b = 1\n")) == {"b": 1}
+    with pytest.raises(FileError, match=r"a\.toml: is not TOML: [^\n]+line 1[^\n]+$"):
+        read_toml(write_file(tmp_path / "a.toml", "[1, 2]"))
+    (tmp_path / "a.toml").unlink()
+    spoil(tmp_path / "a.toml")
+    with pytest.raises(FileError, match=r"a\.toml: (is|cannot be) [^\n]+"):
+        read_toml(tmp_path / "a.toml")
 
 
 @pytest.mark.parametrize(
