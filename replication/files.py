@@ -264,7 +264,7 @@ STORED = ("open_maze", "obstacle_maze", "soccer")
 
 
 def stored(name: str) -> Path:
-    """Return the file of demonstrations that come with the package.
+    """Return the file of demonstrations that come with the package, in a clone that of `data`.
 
     Parameters
     ----------
@@ -283,7 +283,8 @@ def stored(name: str) -> Path:
     """
     if name not in STORED:
         raise UserError(unknown(name, STORED, "demonstrations"))
-    return Path(__file__).parent / "stored" / f"{name}.json"
+    own = PROJECT / "data" / "demos" / f"{name}.json"
+    return own if own.exists() else Path(__file__).parent / "stored" / own.name
 
 
 def resolve(path: str | os.PathLike[str]) -> Path:

@@ -580,7 +580,7 @@ def test_learn_asks_for_the_room_that_its_result_takes(
     assert replicate("learn", tmp_path / "large.json", *words, "--out", tmp_path).exit_code == 0
     (size,) = asked
     written = (tmp_path / "large-unified-incorrect.json").stat().st_size
-    assert files.ROOM < written + files.ROOM < size
+    assert files.ROOM + written < size
 
 
 # --- demos and choices -----------------------------------------------------------------------

@@ -160,6 +160,7 @@ def test_wheel_works_alone(bare: Path, tmp_path: Path) -> None:
     run(replicate, "demos", "make", "map.txt", "--task", "mine", "--out", "mine.json")
     assert run(replicate, "demos", "check", "mine.json") == "mine.json: ok\n"
     assert "picture: build/learn/mine-" in run(replicate, "learn", "mine.json")
+    assert "lab.html in a browser" in run(replicate, "lab", "--out", "lab.html")
     line = run(replicate, "run", code=2)
     assert "clone the repository" in line
     assert line.count("\n") == 1

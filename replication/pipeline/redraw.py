@@ -97,7 +97,8 @@ def _redraw_folder(
 
 def _check_whole(folder: Path, manifest: Mapping[str, Any], file: str) -> None:
     how = damaged(folder, manifest, (file,)).get(file)
-    how = how or ("" if file in manifest["outputs"] else "not in the manifest")
+    if file not in manifest["outputs"]:
+        how = "not in the manifest"
     if how:
         message = f"is {how} since its run; first: replicate run {folder.name}"
         raise NotebookError(f"{folder / file}: {message}")

@@ -33,7 +33,7 @@ from replication.report.choices import NAMES, value
 from replication.report.readable import F_LABELS, full_label
 
 MATTERS, MOSTLY = 0.05, 0.5
-"""From which share of the variance on a choice is named in words, or chance alone."""
+"""The shares of the variance from which on a choice is named in words, and chance instead of it."""
 
 
 # --- below the verdicts --------------------------------------------------------------------------

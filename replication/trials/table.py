@@ -10,7 +10,6 @@ import pandas as pd
 
 from replication.trials.condition import Condition
 from replication.trials.measures import Report, measure_trials, planned_trials
-from replication.trials.run import run_trials
 
 
 @dataclass(frozen=True)
@@ -40,6 +39,8 @@ def computed_table(
     `report`, `errors` and `path` are those of :func:`replication.trials.measures.measure_trials`,
     `settings` those of :func:`replication.trials.run.run_trials`.
     """
+    from replication.trials.run import run_trials  # needs an extra, as groups alone do not
+
     results = {
         trials: run_trials(
             [one for group in groups if group.trials == trials for one in group.conditions],

@@ -113,7 +113,7 @@ def _snapshot() -> Path:
     """Copy the package once: whoever edits it while the tests run does not disturb them."""
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    shutil.copytree(PROJECT / "replication", folder / "replication", symlinks=True)
+    shutil.copytree(PROJECT / "replication", folder / "replication")
     shutil.copy2(PROJECT / "environment.lock", folder)
     subprocess.run([sys.executable, "-c", WARM], cwd=folder, check=True)
     return folder
@@ -131,8 +131,7 @@ class Checkout:
         self.mark = uuid.uuid4().hex
         self.scratch = self.folder.with_name(self.folder.name + "-scratch")
         self.scratch.mkdir(parents=True)
-        # numba's cache, too: its stamps are the files'; a link stays one, as in a clone
-        shutil.copytree(_snapshot(), self.folder, symlinks=True)
+        shutil.copytree(_snapshot(), self.folder)  # numba's cache, too: its stamps are the files'
         (self.folder / "data" / "demos").mkdir(parents=True)
         save_demos(
             demonstrate("small", Maze.from_text(SMALL)), self.folder / "data/demos/small.json"
