@@ -200,6 +200,18 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     assert list((tmp_path / "full").iterdir()) == []
 
 
+def test_as_much_room_is_asked_for_as_is_needed(tmp_path: Path) -> None:
+    """A limit between what is usual and what is needed refuses only the latter."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM + 1, before[1]))
+    try:
+        check_writable(tmp_path)
+        with pytest.raises(UserError, match="cannot be written: file too large"):
+            check_writable(tmp_path, ROOM + 2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
 def test_text_that_is_not_unicode_leaves_the_old_file(tmp_path: Path) -> None:
     """Text that UTF-8 cannot hold is an error before anything is written."""
     target = write_file(tmp_path / "file", "old")
@@ -311,6 +323,16 @@ def test_paths_are_shown_from_the_project_on(
 def test_stored_demonstrations_are_those_of_the_project(name: str) -> None:
     """They are the files of `data/demos`, which notebooks read, and not copies."""
     assert stored(name).samefile(files.PROJECT / "data" / "demos" / f"{name}.json")
+
+
+def test_stored_demonstrations_come_with_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no project has them they are the package's own, a link or not."""
+    monkeypatch.setattr(files, "PROJECT", tmp_path)
+    assert stored("soccer") == Path(files.__file__).parent / "stored" / "soccer.json"
+    mine = write_file(tmp_path / "data" / "demos" / "soccer.json", "{}")
+    assert stored("soccer") == mine
 
 
 def test_other_demonstrations_are_not_stored() -> None:

@@ -324,6 +324,18 @@ def test_a_file_of_another_kind_stays(tmp_path: Path) -> None:
     assert not [*tmp_path.glob("*.damaged")]
 
 
+def test_a_damaged_store_of_any_name_is_set_aside(tmp_path: Path) -> None:
+    """What SQLite still takes for a database is a store, and its trials come again."""
+    path = tmp_path / "mine"
+    store = Store(path)
+    store.put([("a", trial([1.0], 1))])
+    store._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    store._connection.close()
+    path.write_bytes(path.read_bytes().replace(b"CREATE TABLE", b"CREATE T\xb8BLE", 1))
+    assert "a" not in Store(path)
+    assert path.with_name("mine.damaged").exists()
+
+
 def test_neighbours_of_a_store_are_looked_at(store_path: Path) -> None:
     """A pipe where SQLite keeps its journal would block it; a folder lets nothing be set aside."""
     store_path.parent.mkdir()
