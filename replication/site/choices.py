@@ -53,8 +53,11 @@ def _matter(shares: pd.DataFrame) -> str:
         name = f"[{_capital(title(id))}](#choice-{PLACES.get(id, id).lower()})"
         rows.append({"Choice": name, "What hangs on it (share of the variance)": ", ".join(on)})
     small = ", ".join(NAMES[id] for id in most[most < MATTERS].index)
-    rest = f"\nNo claim hangs by {MATTERS:.0%} or more on {small}.\n" if small else ""
-    return f"{markdown(pd.DataFrame(rows))}{rest}"
+    rest = f"None of these claims hangs by {MATTERS:.0%} or more on {small}." if small else ""
+    if len(chance):
+        names = ", ".join(map(short_label, chance))
+        rest += f" The effects of others vary mostly by chance: {names}."
+    return f"{markdown(pd.DataFrame(rows))}\n{rest.strip()}\n"
 
 
 PLACES = {"MAP": "MAP-OPEN"}
